@@ -1,0 +1,7 @@
+"""Lets the tests import the tools the way that the tools import one another."""
+
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tools"))
