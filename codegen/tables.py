@@ -1,0 +1,109 @@
+"""Writes a station's description as C tables, and the sizes that the firmware's arrays have."""
+
+from station import Connector, Group, Station
+
+
+def sizes_header(stations: list[Station], real: str) -> str:
+    """include/taper/sizes.h: the greatest of each over the stations of this image."""
+    return f"""\
+/**
+ * Sizes of this image: the greatest that any of its stations needs. Generated, see codegen/.
+ * Stations: {", ".join(station.name for station in stations)}.
+ */
+#ifndef TAPER_SIZES_H
+#define TAPER_SIZES_H
+
+#define TAPER_MAX_CONNECTORS {max(len(station.connectors) for station in stations)}
+#define TAPER_MAX_STEPS {max(station.steps for station in stations)}
+#define TAPER_MAX_GROUPS {max(len(station.groups) for station in stations)}
+
+/** Floating-point type of battery, horizon and planner: 1 double, 0 float. */
+#define TAPER_REAL_IS_DOUBLE {int(real == "double")}
+
+#endif
+"""
+
+
+def stations_header(stations: list[Station]) -> str:
+    """include/taper/stations.h."""
+    declared = "\n".join(
+        f"/** {station.description}. */\nextern const taper_station_config_t taper_station_{station.name};"
+        for station in stations
+    )
+    return f"""\
+/** The stations that this image knows. Generated, see codegen/. */
+#ifndef TAPER_STATIONS_H
+#define TAPER_STATIONS_H
+
+#include "taper/types.h"
+
+{declared}
+
+/** All of them, in the order above. */
+extern const taper_station_config_t *const taper_stations[];
+extern const unsigned taper_station_count;
+
+#endif
+"""
+
+
+def stations_source(stations: list[Station]) -> str:
+    """stations.c."""
+    tables = "\n".join(_station(station) for station in stations)
+    entries = "".join(f"    &taper_station_{station.name},\n" for station in stations)
+    return f"""\
+/* Generated, see codegen/. */
+#include "taper/stations.h"
+
+{tables}
+const taper_station_config_t *const taper_stations[] = {{
+{entries}}};
+
+const unsigned taper_station_count = {len(stations)};
+"""
+
+
+def _station(station: Station) -> str:
+    name = station.name
+    groups = "".join(f"    {_group(group)}\n" for group in station.groups)
+    connectors = "".join(f"    {_connector(connector)}\n" for connector in station.connectors)
+    return f"""\
+static const taper_group_config_t {name}_groups[] = {{
+{groups}}};
+
+static const taper_connector_config_t {name}_connectors[] = {{
+{connectors}}};
+
+const taper_station_config_t taper_station_{name} = {{
+    .name = "{name}",
+    .connectors = {name}_connectors,
+    .groups = {name}_groups,
+    .failsafe_W = {station.failsafe_W},
+    .tick_ms = {station.tick_ms},
+    .min_on_ms = {station.min_on_ms},
+    .min_off_ms = {station.min_off_ms},
+    .step_s = {station.step_s},
+    .steps = {station.steps},
+    .connector_count = {len(station.connectors)},
+    .group_count = {len(station.groups)},
+}};
+"""
+
+
+def _group(group: Group) -> str:
+    parent = "TAPER_NO_GROUP" if group.parent is None else str(group.parent)
+    return f"{{.limit_W = {group.limit_W}, .parent = {parent}}}, /* {group.name} */"
+
+
+def _connector(connector: Connector) -> str:
+    fields = {
+        "min_mA": connector.min_mA,
+        "max_mA": connector.max_mA,
+        "voltage_mV": connector.voltage_mV,
+        "phases": connector.phases,
+        "group": connector.group,
+        "bus": connector.bus,
+        "node": connector.node,
+        "is_dc": "true" if connector.kind == "DC" else "false",
+    }
+    return "{" + ", ".join(f".{name} = {value}" for name, value in fields.items()) + "},"
