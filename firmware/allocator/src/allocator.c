@@ -1,0 +1,142 @@
+#include "taper/allocator.h"
+
+#include <string.h>
+
+/** Everything one allocation needs, so that the helpers below take one argument. */
+typedef struct {
+    const taper_station_config_t *config;
+    const taper_snapshot_t *snapshot;
+    const taper_proposal_t *proposal;
+    int64_t room_mW[TAPER_MAX_GROUPS]; /* never negative */
+    int32_t *current_mA;
+} round_t;
+
+void taper_allocator_init(taper_allocator_t *allocator) {
+    memset(allocator, 0, sizeof *allocator);
+}
+
+static void open_rooms(round_t *round, int32_t site_limit_W) {
+    for (uint8_t k = 0; k < round->config->group_count; k++) {
+        int32_t limit_W = round->config->groups[k].limit_W;
+        if (k == 0) {
+            limit_W = taper_min_i32(limit_W, site_limit_W);
+        }
+        round->room_mW[k] = (int64_t)taper_max_i32(limit_W, 0) * 1000;
+    }
+}
+
+static int64_t least_room_mW(const round_t *round, uint8_t i) {
+    int64_t least = INT64_MAX;
+    for (uint8_t k = round->config->connectors[i].group; k != TAPER_NO_GROUP; k = round->config->groups[k].parent) {
+        least = round->room_mW[k] < least ? round->room_mW[k] : least;
+    }
+    return least;
+}
+
+static void take_room(round_t *round, uint8_t i, int64_t power_mW) {
+    for (uint8_t k = round->config->connectors[i].group; k != TAPER_NO_GROUP; k = round->config->groups[k].parent) {
+        round->room_mW[k] -= power_mW;
+    }
+}
+
+/** Current that `power_W` needs, rounded down. 1 mA carries W_per_A mW. */
+static int32_t current_of_mA(const taper_demand_t *demand, int64_t power_mW) {
+    return taper_saturate_i32(power_mW / demand->W_per_A);
+}
+
+static int32_t whole_steps(int32_t current_mA) {
+    return current_mA - current_mA % TAPER_CURRENT_STEP_mA;
+}
+
+/** Raise a connector towards `target_mA` as far as every room allows; below its minimum not at all. */
+static void raise(round_t *round, uint8_t i, int32_t target_mA) {
+    const taper_demand_t *demand = &round->snapshot->demand[i];
+    const int32_t present_mA = round->current_mA[i];
+    const int32_t most_mA = taper_min_i32(target_mA, demand->max_mA);
+    if (most_mA <= present_mA) {
+        return;
+    }
+    const int32_t fits_mA = current_of_mA(demand, least_room_mW(round, i));
+    const int32_t raised_mA = whole_steps(present_mA + taper_min_i32(most_mA - present_mA, fits_mA));
+    if (raised_mA <= present_mA || raised_mA < demand->min_mA) {
+        return;
+    }
+    take_room(round, i, (int64_t)(raised_mA - present_mA) * demand->W_per_A);
+    round->current_mA[i] = raised_mA;
+}
+
+/** A switch that belongs to another session has no history. */
+static const taper_switch_t *switch_of(const taper_allocator_t *allocator, uint8_t i, uint8_t session) {
+    static const taper_switch_t fresh = {0};
+    return allocator->state[i].session == session ? &allocator->state[i] : &fresh;
+}
+
+static bool held(const taper_switch_t *state, bool on, uint32_t now_ms, uint32_t least_ms) {
+    return state->switched && state->on == on && taper_elapsed_ms(now_ms, state->since_ms) < least_ms;
+}
+
+/** Current to start from for a wish: with a minimum, a wish below it becomes the minimum or nothing. */
+static int32_t wished_mA(const round_t *round, const taper_switch_t *state, uint8_t i) {
+    const taper_demand_t *demand = &round->snapshot->demand[i];
+    const int32_t wish_mA = current_of_mA(demand, (int64_t)taper_max_i32(round->proposal->wish_W[i], 0) * 1000);
+    if (wish_mA >= demand->min_mA) {
+        return wish_mA;
+    }
+    const bool stays_on = held(state, true, round->snapshot->now_ms, round->config->min_on_ms);
+    return stays_on || wish_mA >= demand->min_mA / 2 ? demand->min_mA : 0;
+}
+
+/** Current that uses a ceiling whole: rounded up to the step of the wire, and at least the minimum. */
+static int32_t ceiling_mA(const round_t *round, uint8_t i) {
+    const taper_demand_t *demand = &round->snapshot->demand[i];
+    const int32_t ceiling_W = taper_max_i32(round->proposal->ceiling_W[i], round->proposal->wish_W[i]);
+    if (ceiling_W <= 0) {
+        return 0;
+    }
+    const int32_t needed_mA = current_of_mA(demand, (int64_t)ceiling_W * 1000 + demand->W_per_A - 1);
+    const int32_t rounded_mA = taper_min_i32(needed_mA, INT32_MAX - TAPER_CURRENT_STEP_mA) + TAPER_CURRENT_STEP_mA - 1;
+    return taper_max_i32(whole_steps(rounded_mA), demand->min_mA);
+}
+
+static bool may_have_current(const round_t *round, const taper_allocator_t *allocator, uint8_t i) {
+    if (i >= round->snapshot->count || !round->snapshot->demand[i].active) {
+        return false;
+    }
+    const taper_demand_t *demand = &round->snapshot->demand[i];
+    const taper_switch_t *state = switch_of(allocator, i, demand->session);
+    return demand->min_mA == 0 || !held(state, false, round->snapshot->now_ms, round->config->min_off_ms);
+}
+
+static void note_switch(taper_switch_t *state, const taper_demand_t *demand, bool on, uint32_t now_ms) {
+    if (!demand->active || state->session != demand->session) {
+        *state = (taper_switch_t){.session = demand->active ? demand->session : 0};
+    }
+    if (state->on != on) {
+        *state = (taper_switch_t){.on = on, .switched = true, .session = state->session, .since_ms = now_ms};
+    }
+}
+
+void taper_allocate(taper_allocator_t *allocator, const taper_station_config_t *config,
+                    const taper_snapshot_t *snapshot, const taper_proposal_t *proposal, int32_t site_limit_W,
+                    taper_setpoints_t *setpoints) {
+    round_t round = {
+        .config = config, .snapshot = snapshot, .proposal = proposal, .current_mA = setpoints->current_mA};
+    memset(setpoints, 0, sizeof *setpoints);
+    open_rooms(&round, site_limit_W);
+    for (uint8_t place = 0; place < snapshot->count; place++) {
+        const uint8_t i = proposal->rank[place];
+        if (may_have_current(&round, allocator, i)) {
+            const taper_switch_t *state = switch_of(allocator, i, snapshot->demand[i].session);
+            raise(&round, i, wished_mA(&round, state, i));
+        }
+    }
+    for (uint8_t place = 0; place < snapshot->count; place++) {
+        const uint8_t i = proposal->rank[place];
+        if (may_have_current(&round, allocator, i)) {
+            raise(&round, i, ceiling_mA(&round, i));
+        }
+    }
+    for (uint8_t i = 0; i < snapshot->count; i++) {
+        note_switch(&allocator->state[i], &snapshot->demand[i], setpoints->current_mA[i] > 0, snapshot->now_ms);
+    }
+}

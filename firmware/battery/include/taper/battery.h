@@ -1,0 +1,30 @@
+/**
+ * The taper: how much power a battery takes at a given state of charge (SOC).
+ *
+ * Model (paper, eq. 5): a line that falls from `peak_W` at SOC 0 by `taper_W` until SOC 1,
+ *
+ *     limit(x) = peak - taper * x / capacity,  never below 0
+ *
+ * with x the energy in the battery. A vehicle of unknown capacity has no taper.
+ */
+#ifndef TAPER_BATTERY_H
+#define TAPER_BATTERY_H
+
+#include <stdint.h>
+
+#include "taper/real.h"
+#include "taper/types.h"
+
+/** Most that the vehicle takes at its present SOC [W], >= 0, rounded up. Integer arithmetic. */
+int32_t taper_battery_limit_W(const taper_demand_t *demand);
+
+/**
+ * Most that is of any use over the next `tick_ms` [W], >= 0: the least of what connector and vehicle allow, what the
+ * battery takes, and what completes the need within the tick, rounded up. 0 for an inactive demand.
+ */
+int32_t taper_battery_useful_W(const taper_demand_t *demand, uint32_t tick_ms);
+
+/** Fall of the limit per energy charged: `a` in `u + a x <= p` [1/h], >= 0. */
+taper_real_t taper_battery_slope_per_h(const taper_demand_t *demand);
+
+#endif

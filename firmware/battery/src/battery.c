@@ -1,0 +1,30 @@
+#include "taper/battery.h"
+
+static int64_t divide_up(int64_t numerator, int64_t denominator) {
+    return (numerator + denominator - 1) / denominator;
+}
+
+int32_t taper_battery_limit_W(const taper_demand_t *demand) {
+    if (demand->capacity_Wh <= 0) {
+        return demand->peak_W;
+    }
+    const int64_t fall_W = (int64_t)demand->taper_W * demand->stored_Wh / demand->capacity_Wh;
+    return taper_saturate_i32(fall_W >= demand->peak_W ? 0 : demand->peak_W - fall_W);
+}
+
+int32_t taper_battery_useful_W(const taper_demand_t *demand, uint32_t tick_ms) {
+    if (!demand->active || tick_ms == 0) {
+        return 0;
+    }
+    const int64_t allowed_W = (int64_t)demand->max_mA * demand->W_per_A / 1000;
+    const int64_t completing_W = divide_up((int64_t)demand->need_Wh * 3600 * 1000, tick_ms);
+    const int32_t offered_W = taper_min_i32(taper_saturate_i32(allowed_W), taper_saturate_i32(completing_W));
+    return taper_min_i32(offered_W, taper_battery_limit_W(demand));
+}
+
+taper_real_t taper_battery_slope_per_h(const taper_demand_t *demand) {
+    if (demand->capacity_Wh <= 0) {
+        return 0;
+    }
+    return (taper_real_t)demand->taper_W / (taper_real_t)demand->capacity_Wh;
+}

@@ -1,0 +1,84 @@
+#include "taper/codec.h"
+
+#include <string.h>
+
+#include "codec_internal.h"
+#include "taper/types.h"
+
+/* Which nodes a function may carry in its identifier. */
+typedef enum {
+    NODE_CONNECTOR,
+    NODE_GATEWAY,
+    NODE_CONTROLLER,
+} node_class_t;
+
+typedef struct {
+    taper_message_kind_t kind;
+    node_class_t node;
+    void (*decode)(const uint8_t *data, taper_message_t *message, taper_decoding_t *decoding);
+    bool (*encode)(const taper_message_t *message, uint8_t *data);
+} route_t;
+
+static const route_t routes[] = {
+    {TAPER_MESSAGE_SITE_LIMIT, NODE_GATEWAY, taper_decode_site_limit, taper_encode_site_limit},
+    {TAPER_MESSAGE_SETPOINT, NODE_CONNECTOR, taper_decode_setpoint, taper_encode_setpoint},
+    {TAPER_MESSAGE_EVSE_STATUS, NODE_CONNECTOR, taper_decode_evse_status, taper_encode_evse_status},
+    {TAPER_MESSAGE_EV_STATUS, NODE_CONNECTOR, taper_decode_ev_status, taper_encode_ev_status},
+    {TAPER_MESSAGE_EVSE_ELEC, NODE_CONNECTOR, taper_decode_evse_elec, taper_encode_evse_elec},
+    {TAPER_MESSAGE_TIME_SYNC, NODE_GATEWAY, taper_decode_time_sync, taper_encode_time_sync},
+    {TAPER_MESSAGE_CTRL_STATUS, NODE_CONTROLLER, taper_decode_ctrl_status, taper_encode_ctrl_status},
+    {TAPER_MESSAGE_EV_PARAM_A, NODE_CONNECTOR, taper_decode_ev_param_a, taper_encode_ev_param_a},
+    {TAPER_MESSAGE_EV_PARAM_B, NODE_CONNECTOR, taper_decode_ev_param_b, taper_encode_ev_param_b},
+    {TAPER_MESSAGE_EV_PARAM_C, NODE_CONNECTOR, taper_decode_ev_param_c, taper_encode_ev_param_c},
+    {TAPER_MESSAGE_EV_PARAM_D, NODE_CONNECTOR, taper_decode_ev_param_d, taper_encode_ev_param_d},
+};
+
+static bool node_allowed(node_class_t node_class, unsigned node) {
+    switch (node_class) {
+    case NODE_CONNECTOR: return node >= 1 && node <= TAPER_NODES_PER_BUS;
+    case NODE_GATEWAY: return node == TAPER_NODE_GATEWAY;
+    case NODE_CONTROLLER: return node == TAPER_NODE_CONTROLLER;
+    }
+    return false;
+}
+
+/* NULL for a kind that the DBC does not have, or a node that it does not allow. */
+static const route_t *find_route(unsigned kind, unsigned node) {
+    for (size_t i = 0; i < sizeof routes / sizeof routes[0]; i++) {
+        if ((unsigned)routes[i].kind == kind) {
+            return node_allowed(routes[i].node, node) ? &routes[i] : NULL;
+        }
+    }
+    return NULL;
+}
+
+bool taper_decode(const taper_frame_t *frame, taper_message_t *message, bool *bad_field) {
+    const unsigned node = frame->id & 0x3Fu;
+    const route_t *route = find_route((unsigned)frame->id >> 6, node);
+    if (route == NULL || frame->length != TAPER_FRAME_LENGTH) {
+        return false;
+    }
+    memset(message, 0, sizeof *message);
+    message->kind = route->kind;
+    message->bus = frame->bus;
+    message->node = (uint8_t)node;
+
+    taper_decoding_t decoding = {.bad_field = false, .refused = false};
+    route->decode(frame->data, message, &decoding);
+    if (decoding.bad_field) {
+        *bad_field = true;
+    }
+    return !decoding.refused;
+}
+
+bool taper_encode(const taper_message_t *message, taper_frame_t *frame) {
+    const route_t *route = find_route((unsigned)message->kind, message->node);
+    if (route == NULL) {
+        return false;
+    }
+    memset(frame, 0, sizeof *frame);
+    frame->id = taper_can_id(message->kind, message->node);
+    frame->bus = message->bus;
+    frame->length = TAPER_FRAME_LENGTH;
+    return route->encode(message, frame->data);
+}

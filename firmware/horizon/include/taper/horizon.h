@@ -1,0 +1,64 @@
+/**
+ * Snapshot and site limits -> the numbers of the planning problem. Knows no solver.
+ *
+ * The problem (docs/design.md, "The planning problem"), per unit: power in units of the station's strongest connector
+ * `base_W`, energy in units of base_W for one step. Variables are v(i,t), the energy that connector i has received
+ * from now to the end of step t = 0..T-1, so that its power is u(i,t) = v(i,t) - v(i,t-1), v(i,-1) = 0.
+ *
+ *     minimise  sum_t g^(t+1) sum_i [ q/2 u(i,t)^2 - w_i u(i,t) ]        g = TAPER_DISCOUNT, q = TAPER_CURVATURE
+ *     rate      0 <= u(i,t) <= rate limit, 0 outside the stay            (paper, eq. 1 and 3)
+ *     taper     u(i,t) + a_i v(i,t-1) <= limit at the present SOC        (paper, eq. 5; at t = 0 part of rate)
+ *     target    v(i,T-1) <= need
+ *     sum       sum of u over the connectors of group k <= P_k(t)        (paper, eq. 2)
+ *
+ * The variable (i,t) has index i*T + t. Rows stand in the order rate [N*T], taper [N*(T-1)], target [N], sum [K*T].
+ * What does not apply is masked by bounds (l = u, or unbounded), never by the cost: that converges 2-5 times faster.
+ * Target and sum rows are scaled as below, which saves about a third of the iterations.
+ */
+#ifndef TAPER_HORIZON_H
+#define TAPER_HORIZON_H
+
+#include <stdint.h>
+
+#include "taper/real.h"
+#include "taper/types.h"
+
+/** Discount per step: charging early is worth more, so power is used when it is there. */
+#define TAPER_DISCOUNT ((taper_real_t)0.95)
+/** Curvature of the cost of power: small, for a unique answer that shares between equals. */
+#define TAPER_CURVATURE ((taper_real_t)0.1)
+/** Factor of the target rows. */
+#define TAPER_TARGET_SCALE ((taper_real_t)0.58)
+
+#define TAPER_MAX_VARIABLES (TAPER_MAX_CONNECTORS * TAPER_MAX_STEPS)
+#define TAPER_MAX_ROWS (2 * TAPER_MAX_VARIABLES + TAPER_MAX_GROUPS * TAPER_MAX_STEPS)
+
+typedef struct {
+    const taper_station_config_t *config;
+    taper_real_t base_W;                           /**< power unit */
+    taper_real_t linear[TAPER_MAX_VARIABLES];      /**< linear cost */
+    taper_real_t lower[TAPER_MAX_ROWS];            /**< row bounds; +-TAPER_REAL_UNBOUNDED: none */
+    taper_real_t upper[TAPER_MAX_ROWS];
+    taper_real_t taper_keep[TAPER_MAX_CONNECTORS]; /**< 1 - a_i: taper row (i,t) is v(i,t) - keep v(i,t-1) */
+} taper_horizon_t;
+
+/**
+ * State the problem for `snapshot`. `site_limit_W[t]` is the site's limit in step t, >= 0, [config->steps].
+ * Cost: O(connectors x steps + groups x steps). `horizon->config` is `config` afterwards.
+ */
+void taper_horizon_build(taper_horizon_t *horizon, const taper_station_config_t *config,
+                         const taper_snapshot_t *snapshot, const int32_t *site_limit_W);
+
+/** Quadratic cost on v(i,t)^2 (diagonal of the Hessian), the same for all connectors. */
+taper_real_t taper_horizon_hessian_diagonal(uint8_t steps, uint8_t t);
+
+/** Quadratic cost on v(i,t-1) v(i,t) (off the diagonal of the Hessian), t >= 1. */
+taper_real_t taper_horizon_hessian_neighbour(uint8_t t);
+
+/** Factor of the sum rows of a group with `members` connectors: sqrt(5 / members). */
+taper_real_t taper_horizon_sum_scale(uint8_t members);
+
+/** Whether connector `i` hangs below group `k` of the feeder tree. */
+bool taper_group_contains(const taper_station_config_t *config, uint8_t k, uint8_t i);
+
+#endif

@@ -1,0 +1,177 @@
+#include "taper/horizon.h"
+
+#include <tgmath.h>
+
+#include "taper/battery.h"
+
+/** What one connector brings into the problem, per unit. */
+typedef struct {
+    taper_real_t rate;      /* limit of connector and vehicle */
+    taper_real_t taper;     /* limit at the present SOC */
+    taper_real_t slope;     /* a_i per step */
+    taper_real_t need;      /* energy */
+    taper_real_t weight;    /* w_i */
+    int32_t departs_in_s;
+} chain_t;
+
+static taper_real_t discount_to(unsigned power) {
+    taper_real_t value = 1;
+    for (unsigned k = 0; k < power; k++) {
+        value *= TAPER_DISCOUNT;
+    }
+    return value;
+}
+
+taper_real_t taper_horizon_hessian_diagonal(uint8_t steps, uint8_t t) {
+    const taper_real_t own = discount_to((unsigned)t + 1);
+    const taper_real_t next = t + 1 < steps ? own * TAPER_DISCOUNT : 0;
+    return TAPER_CURVATURE * (own + next);
+}
+
+taper_real_t taper_horizon_hessian_neighbour(uint8_t t) {
+    return -TAPER_CURVATURE * discount_to((unsigned)t + 1);
+}
+
+taper_real_t taper_horizon_sum_scale(uint8_t members) {
+    return (taper_real_t)sqrt((taper_real_t)5 / (taper_real_t)members);
+}
+
+bool taper_group_contains(const taper_station_config_t *config, uint8_t k, uint8_t i) {
+    uint8_t group = config->connectors[i].group;
+    for (uint8_t depth = 0; depth < config->group_count && group != TAPER_NO_GROUP; depth++) {
+        if (group == k) {
+            return true;
+        }
+        group = config->groups[group].parent;
+    }
+    return false;
+}
+
+static taper_real_t strongest_connector_W(const taper_station_config_t *config) {
+    int64_t strongest_mW = 1;
+    for (uint8_t i = 0; i < config->connector_count; i++) {
+        const taper_connector_config_t *connector = &config->connectors[i];
+        const int64_t power_mW = (int64_t)connector->max_mA * connector->voltage_mV / 1000 * connector->phases;
+        strongest_mW = power_mW > strongest_mW ? power_mW : strongest_mW;
+    }
+    return (taper_real_t)strongest_mW / 1000;
+}
+
+/** Share of step t in which a vehicle is there. The running step counts whole: its power is set now. */
+static taper_real_t presence(int32_t departs_in_s, uint16_t step_s, uint8_t t) {
+    if (t == 0) {
+        return 1;
+    }
+    const int32_t left_s = taper_clamp_i32(departs_in_s - (int32_t)t * step_s, 0, step_s);
+    return (taper_real_t)left_s / (taper_real_t)step_s;
+}
+
+/** The prefer-the-urgent weight: 3 in the last step before departure, falling towards 1. */
+static taper_real_t urgency(int32_t departs_in_s, uint16_t step_s) {
+    const int32_t steps = departs_in_s / step_s;
+    return 1 + (taper_real_t)2 / (taper_real_t)taper_max_i32(steps, 1);
+}
+
+static chain_t chain_of(const taper_horizon_t *horizon, const taper_demand_t *demand) {
+    const uint16_t step_s = horizon->config->step_s;
+    const taper_real_t step_h = (taper_real_t)step_s / 3600;
+    const taper_real_t allowed_W = (taper_real_t)((int64_t)demand->max_mA * demand->W_per_A) / 1000;
+    const taper_real_t slope = taper_battery_slope_per_h(demand) * step_h;
+    return (chain_t){
+        .rate = allowed_W / horizon->base_W,
+        .taper = (taper_real_t)taper_battery_limit_W(demand) / horizon->base_W,
+        .slope = slope < 1 ? slope : 1, /* a battery that fills within one step: the taper row then bounds v(i,t) */
+        .need = (taper_real_t)demand->need_Wh / (horizon->base_W * step_h),
+        .weight = urgency(demand->departs_in_s, step_s),
+        .departs_in_s = demand->departs_in_s,
+    };
+}
+
+static void write_idle(taper_horizon_t *horizon, uint8_t i) {
+    const uint8_t steps = horizon->config->steps;
+    const unsigned taper_row = (unsigned)horizon->config->connector_count * steps + i * (steps - 1U);
+    for (uint8_t t = 0; t < steps; t++) {
+        const unsigned v = (unsigned)i * steps + t;
+        horizon->linear[v] = 0;
+        horizon->lower[v] = 0;
+        horizon->upper[v] = 0;
+        if (t > 0) {
+            horizon->lower[taper_row + t - 1] = -TAPER_REAL_UNBOUNDED;
+            horizon->upper[taper_row + t - 1] = TAPER_REAL_UNBOUNDED;
+        }
+    }
+    horizon->taper_keep[i] = 1;
+}
+
+static void write_chain(taper_horizon_t *horizon, uint8_t i, const chain_t *chain) {
+    const uint8_t steps = horizon->config->steps;
+    const unsigned taper_row = (unsigned)horizon->config->connector_count * steps + i * (steps - 1U);
+    taper_real_t worth = chain->weight * TAPER_DISCOUNT; /* of a unit of energy in step t */
+    for (uint8_t t = 0; t < steps; t++) {
+        const unsigned v = (unsigned)i * steps + t;
+        const taper_real_t next = t + 1 < steps ? worth * TAPER_DISCOUNT : 0;
+        const taper_real_t there = presence(chain->departs_in_s, horizon->config->step_s, t);
+        horizon->linear[v] = next - worth;
+        worth = next;
+        horizon->lower[v] = 0;
+        horizon->upper[v] = chain->rate * there;
+        if (t == 0) {
+            horizon->upper[v] = fmin(horizon->upper[v], chain->taper);
+            continue;
+        }
+        const bool tapers = chain->slope > 0 || chain->taper < chain->rate;
+        horizon->lower[taper_row + t - 1] = -TAPER_REAL_UNBOUNDED;
+        horizon->upper[taper_row + t - 1] = tapers && there > 0 ? chain->taper : TAPER_REAL_UNBOUNDED;
+    }
+    horizon->taper_keep[i] = 1 - chain->slope;
+}
+
+static unsigned target_row(const taper_station_config_t *config) {
+    return (unsigned)config->connector_count * (2U * config->steps - 1U);
+}
+
+static void write_connector(taper_horizon_t *horizon, uint8_t i, const taper_demand_t *demand) {
+    const unsigned target = target_row(horizon->config) + i;
+    horizon->lower[target] = -TAPER_REAL_UNBOUNDED;
+    horizon->upper[target] = TAPER_REAL_UNBOUNDED;
+    if (!demand->active) {
+        write_idle(horizon, i);
+        return;
+    }
+    const chain_t chain = chain_of(horizon, demand);
+    write_chain(horizon, i, &chain);
+    horizon->upper[target] = chain.need * TAPER_TARGET_SCALE;
+}
+
+static uint8_t members_of(const taper_station_config_t *config, uint8_t k) {
+    uint8_t members = 0;
+    for (uint8_t i = 0; i < config->connector_count; i++) {
+        members = (uint8_t)(members + (taper_group_contains(config, k, i) ? 1 : 0));
+    }
+    return members;
+}
+
+static void write_group(taper_horizon_t *horizon, uint8_t k, const int32_t *site_limit_W) {
+    const taper_station_config_t *config = horizon->config;
+    const uint8_t members = members_of(config, k);
+    const taper_real_t scale = members > 0 ? taper_horizon_sum_scale(members) / horizon->base_W : 0;
+    const unsigned first = target_row(config) + config->connector_count + (unsigned)k * config->steps;
+    for (uint8_t t = 0; t < config->steps; t++) {
+        const int32_t limit_W =
+            k == 0 ? taper_min_i32(site_limit_W[t], config->groups[0].limit_W) : config->groups[k].limit_W;
+        horizon->lower[first + t] = -TAPER_REAL_UNBOUNDED;
+        horizon->upper[first + t] = (taper_real_t)limit_W * scale;
+    }
+}
+
+void taper_horizon_build(taper_horizon_t *horizon, const taper_station_config_t *config,
+                         const taper_snapshot_t *snapshot, const int32_t *site_limit_W) {
+    horizon->config = config;
+    horizon->base_W = strongest_connector_W(config);
+    for (uint8_t i = 0; i < config->connector_count; i++) {
+        write_connector(horizon, i, &snapshot->demand[i]);
+    }
+    for (uint8_t k = 0; k < config->group_count; k++) {
+        write_group(horizon, k, site_limit_W);
+    }
+}

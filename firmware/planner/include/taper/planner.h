@@ -1,0 +1,82 @@
+/**
+ * The planner: solves the horizon's problem in bounded slices and says how good the answer is.
+ *
+ * Behind this header stands OSQP, generated per station by codegen; nothing here shows it, so that another solver can
+ * take its place. One solver instance per station and image: the generated workspace is a global, not re-entrant.
+ */
+#ifndef TAPER_PLANNER_H
+#define TAPER_PLANNER_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "taper/horizon.h"
+#include "taper/types.h"
+
+/** A generated solver (`taper/solvers.h`). */
+typedef struct taper_solver taper_solver_t;
+
+/** Iterations after which a problem that has not converged is given up. */
+#define TAPER_MAX_ITERATIONS 500
+/** Least slice: the solver looks for convergence every so many iterations. */
+#define TAPER_MIN_SLICE 10
+
+/** What is thought of the solver's last answer. On the bus in CTRL_STATUS. */
+typedef enum {
+    TAPER_VERDICT_NONE = 0,       /**< nothing was ever solved */
+    TAPER_VERDICT_SOLVING = 1,    /**< slices remain */
+    TAPER_VERDICT_SOLVED = 2,     /**< converged */
+    TAPER_VERDICT_INACCURATE = 3, /**< out of iterations, residuals within ten times the tolerance: usable */
+    TAPER_VERDICT_LATE = 4,       /**< out of iterations, not usable */
+    TAPER_VERDICT_NOT_FINITE = 5, /**< NaN or infinite values */
+    TAPER_VERDICT_REFUSED = 6,    /**< the solver refused the data or called a feasible problem infeasible */
+} taper_verdict_t;
+
+typedef struct {
+    const taper_solver_t *solver;
+    taper_horizon_t horizon;               /**< the problem being solved */
+    taper_verdict_t verdict;
+    uint16_t iterations;                   /**< spent on the present problem */
+    uint8_t slices;                        /**< of the present problem */
+    uint32_t started_ms;                   /**< time of the snapshot that the problem is for */
+    uint8_t session[TAPER_MAX_CONNECTORS]; /**< whose trajectory the warm start holds; 0: nobody's */
+    bool matrix_is_current;                /**< the solver holds the taper values of `horizon` */
+    taper_real_t keep[TAPER_MAX_CONNECTORS]; /**< the taper values that it holds */
+} taper_planner_t;
+
+/**
+ * Tie a planner to its solver.
+ * @return TAPER_ERR_CONFIG if the solver was generated for another shape than `config`, or refuses its matrices.
+ * Cost: two factorisations.
+ */
+taper_status_t taper_planner_init(taper_planner_t *planner, const taper_solver_t *solver,
+                                  const taper_station_config_t *config);
+
+/**
+ * State a new problem; one that was under way is dropped. The last answer, moved on in time, is the starting point.
+ * `site_limit_W` as in taper_horizon_build(). Cost: O(rows), and one or two factorisations.
+ */
+void taper_planner_start(taper_planner_t *planner, const taper_snapshot_t *snapshot, const int32_t *site_limit_W);
+
+/**
+ * Work one slice of at most `iterations` (>= TAPER_MIN_SLICE) on the present problem.
+ * @return the verdict; TAPER_VERDICT_SOLVING: call again. Cost: `iterations` x cost of an iteration (docs/results.md).
+ */
+taper_verdict_t taper_planner_run(taper_planner_t *planner, uint16_t iterations);
+
+/** Whether the verdict lets the plan be used. */
+bool taper_planner_is_usable(taper_verdict_t verdict);
+
+/**
+ * Planned power of connector `i` in step `t` of a usable plan [W]: finite, within 0..what the connector can carry.
+ * Anything the solver may hold is safe to read: NaN reads as 0.
+ */
+int32_t taper_planner_power_W(const taper_planner_t *planner, uint8_t i, uint8_t t);
+
+/** Iterations spent on the last problem. */
+uint16_t taper_planner_iterations(const taper_planner_t *planner);
+
+/** A real of any value as whole watts: NaN and what is not positive gives 0, too large gives `most_W`. */
+int32_t taper_real_to_W(taper_real_t value, int32_t most_W);
+
+#endif

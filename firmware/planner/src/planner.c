@@ -1,0 +1,210 @@
+#include "taper/planner.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "matrices.h"
+#include "project.h"
+#include "solver.h"
+
+_Static_assert(sizeof(OSQPFloat) == sizeof(taper_real_t), "solver and firmware are built for the same real type");
+_Static_assert(TAPER_MIN_SLICE <= TAPER_MAX_ITERATIONS, "one slice fits the budget");
+
+int32_t taper_real_to_W(taper_real_t value, int32_t most_W) {
+    if (!(value > 0)) { /* also NaN */
+        return 0;
+    }
+    return value < (taper_real_t)most_W ? (int32_t)(value + (taper_real_t)0.5) : most_W;
+}
+
+static bool solver_fits(const taper_solver_t *solver, const taper_station_config_t *config) {
+    const OSQPInt variables = (OSQPInt)config->connector_count * config->steps;
+    return solver->connectors == config->connector_count && solver->steps == config->steps &&
+           solver->groups == config->group_count && solver->variables == variables &&
+           solver->rows == 2 * variables + (OSQPInt)config->group_count * config->steps;
+}
+
+/** Hand the constraint matrix's values over if the tapers changed: that costs a factorisation. */
+static bool load_matrix(taper_planner_t *planner) {
+    const taper_horizon_t *horizon = &planner->horizon;
+    const size_t size = horizon->config->connector_count * sizeof planner->keep[0];
+    if (planner->matrix_is_current && memcmp(planner->keep, horizon->taper_keep, size) == 0) {
+        return true;
+    }
+    const taper_solver_t *solver = planner->solver;
+    (void)taper_write_constraints(solver, horizon->config, horizon->taper_keep);
+    memcpy(planner->keep, horizon->taper_keep, size);
+    planner->matrix_is_current =
+        osqp_update_data_mat(solver->osqp, NULL, NULL, 0, solver->a_values, NULL, solver->a_count) == 0;
+    return planner->matrix_is_current;
+}
+
+taper_status_t taper_planner_init(taper_planner_t *planner, const taper_solver_t *solver,
+                                  const taper_station_config_t *config) {
+    memset(planner, 0, sizeof *planner);
+    planner->solver = solver;
+    planner->horizon.config = config;
+    if (!solver_fits(solver, config)) {
+        return TAPER_ERR_CONFIG;
+    }
+    for (uint8_t i = 0; i < config->connector_count; i++) {
+        planner->keep[i] = 1;
+    }
+    if (taper_write_hessian(solver) != solver->p_count ||
+        taper_write_constraints(solver, config, planner->keep) != solver->a_count ||
+        osqp_update_data_mat(solver->osqp, solver->p_values, NULL, solver->p_count, solver->a_values, NULL,
+                             solver->a_count) != 0) {
+        return TAPER_ERR_CONFIG;
+    }
+    planner->matrix_is_current = true;
+    osqp_cold_start(solver->osqp);
+    return TAPER_OK;
+}
+
+/** Move one connector's part of a row block by `shift` steps; what comes in at the end repeats the last value. */
+static void shift_block(OSQPFloat *values, uint8_t count, uint8_t shift, OSQPFloat factor) {
+    for (uint8_t t = 0; t < count; t++) {
+        const uint8_t from = (uint8_t)(t + shift < count ? t + shift : count - 1);
+        values[t] = values[from] * factor;
+    }
+}
+
+static void clear_block(OSQPFloat *values, uint8_t count) {
+    memset(values, 0, count * sizeof values[0]);
+}
+
+/** The last answer as a starting point: `shift` steps later, and without the vehicles that are new or gone. */
+static void warm_start(taper_planner_t *planner, const taper_snapshot_t *snapshot, uint8_t shift) {
+    const taper_solver_t *solver = planner->solver;
+    OSQPFloat *x = solver->osqp->solution->x;
+    OSQPFloat *y = solver->osqp->solution->y;
+    const uint8_t connectors = solver->connectors;
+    const uint8_t steps = solver->steps;
+    OSQPFloat growth = 1; /* the cost of a step is TAPER_DISCOUNT of the one before: so are the multipliers */
+    for (uint8_t k = 0; k < shift; k++) {
+        growth /= TAPER_DISCOUNT;
+    }
+    for (uint8_t i = 0; i < connectors; i++) {
+        OSQPFloat *chain = x + (size_t)i * steps;
+        OSQPFloat *rate = y + (size_t)i * steps;
+        OSQPFloat *taper = y + (size_t)connectors * steps + (size_t)i * (steps - 1U);
+        OSQPFloat *target = y + (size_t)connectors * (2U * steps - 1U) + i;
+        const uint8_t session = snapshot->demand[i].active ? snapshot->demand[i].session : 0;
+        if (session == 0 || session != planner->session[i]) {
+            clear_block(chain, steps);
+            clear_block(rate, steps);
+            clear_block(taper, (uint8_t)(steps - 1));
+            *target = 0;
+        } else if (shift > 0) {
+            const OSQPFloat charged = chain[shift - 1];
+            shift_block(chain, steps, shift, 1);
+            for (uint8_t t = 0; t < steps; t++) {
+                chain[t] -= charged;
+            }
+            shift_block(rate, steps, shift, growth);
+            shift_block(taper, (uint8_t)(steps - 1), shift, growth);
+            *target *= growth;
+        }
+        planner->session[i] = session;
+    }
+    for (uint8_t k = 0; k < solver->groups; k++) {
+        shift_block(y + (size_t)connectors * 2U * steps + (size_t)k * steps, steps, shift, growth);
+    }
+    osqp_warm_start(solver->osqp, x, y);
+}
+
+static uint8_t steps_since(const taper_planner_t *planner, uint32_t now_ms) {
+    const uint32_t step_ms = planner->horizon.config->step_s * UINT32_C(1000);
+    const uint32_t elapsed = taper_elapsed_ms(now_ms, planner->started_ms) / step_ms;
+    const uint8_t most = (uint8_t)(planner->horizon.config->steps - 1);
+    return elapsed < most ? (uint8_t)elapsed : most;
+}
+
+/** Forget everything that the solver learned: after garbage nothing of it can be trusted. */
+static void reset(taper_planner_t *planner) {
+    OSQPSolver *osqp = planner->solver->osqp;
+    memset(planner->session, 0, sizeof planner->session);
+    planner->matrix_is_current = false;
+    osqp_update_rho(osqp, (OSQPFloat)0.3);
+    osqp_cold_start(osqp);
+}
+
+void taper_planner_start(taper_planner_t *planner, const taper_snapshot_t *snapshot, const int32_t *site_limit_W) {
+    taper_horizon_t *horizon = &planner->horizon;
+    const uint8_t shift = steps_since(planner, snapshot->now_ms);
+    if (!taper_planner_is_usable(planner->verdict) && planner->verdict != TAPER_VERDICT_NONE) {
+        reset(planner);
+    }
+    taper_horizon_build(horizon, horizon->config, snapshot, site_limit_W);
+    const bool accepted =
+        osqp_update_data_vec(planner->solver->osqp, horizon->linear, horizon->lower, horizon->upper) == 0 &&
+        load_matrix(planner);
+    if (accepted) {
+        warm_start(planner, snapshot, shift);
+    }
+    planner->verdict = accepted ? TAPER_VERDICT_SOLVING : TAPER_VERDICT_REFUSED;
+    planner->iterations = 0;
+    planner->slices = 0;
+    planner->started_ms = snapshot->now_ms;
+}
+
+bool taper_planner_is_usable(taper_verdict_t verdict) {
+    return verdict == TAPER_VERDICT_SOLVED || verdict == TAPER_VERDICT_INACCURATE;
+}
+
+static bool all_finite(const OSQPFloat *values, OSQPInt count) {
+    for (OSQPInt k = 0; k < count; k++) {
+        if (!isfinite(values[k])) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/** Verdict on a solver that stopped. `osqp_solve` returns 0 whatever happened: only the status tells. */
+static taper_verdict_t judge(const taper_planner_t *planner) {
+    const taper_solver_t *solver = planner->solver;
+    const OSQPInt status = solver->osqp->info->status_val;
+    if (status == OSQP_PRIMAL_INFEASIBLE || status == OSQP_DUAL_INFEASIBLE || status == OSQP_NON_CVX ||
+        status == OSQP_PRIMAL_INFEASIBLE_INACCURATE || status == OSQP_DUAL_INFEASIBLE_INACCURATE) {
+        return TAPER_VERDICT_REFUSED; /* standing still is always feasible: a numerical fault */
+    }
+    if (!all_finite(solver->osqp->solution->x, solver->variables)) {
+        return TAPER_VERDICT_NOT_FINITE;
+    }
+    if (status == OSQP_SOLVED) {
+        return TAPER_VERDICT_SOLVED;
+    }
+    if (planner->iterations < TAPER_MAX_ITERATIONS) {
+        return TAPER_VERDICT_SOLVING;
+    }
+    return status == OSQP_SOLVED_INACCURATE ? TAPER_VERDICT_INACCURATE : TAPER_VERDICT_LATE;
+}
+
+taper_verdict_t taper_planner_run(taper_planner_t *planner, uint16_t iterations) {
+    if (planner->verdict != TAPER_VERDICT_SOLVING) {
+        return planner->verdict;
+    }
+    OSQPSolver *osqp = planner->solver->osqp;
+    const int32_t left = TAPER_MAX_ITERATIONS - planner->iterations;
+    osqp->settings->max_iter = taper_clamp_i32(iterations, TAPER_MIN_SLICE, left);
+    const bool ran = osqp_solve(osqp) == 0;
+    planner->iterations = (uint16_t)(planner->iterations + osqp->info->iter);
+    planner->slices = (uint8_t)(planner->slices + (planner->slices < UINT8_MAX ? 1 : 0));
+    planner->verdict = ran ? judge(planner) : TAPER_VERDICT_REFUSED;
+    if (taper_planner_is_usable(planner->verdict)) {
+        taper_project(&planner->horizon, osqp->solution->x);
+    }
+    return planner->verdict;
+}
+
+int32_t taper_planner_power_W(const taper_planner_t *planner, uint8_t i, uint8_t t) {
+    const taper_solver_t *solver = planner->solver;
+    const OSQPFloat *chain = solver->osqp->solution->x + (size_t)i * solver->steps;
+    const OSQPFloat energy = t > 0 ? chain[t] - chain[t - 1] : chain[0];
+    return taper_real_to_W(energy * planner->horizon.base_W, taper_real_to_W(planner->horizon.base_W, INT32_MAX));
+}
+
+uint16_t taper_planner_iterations(const taper_planner_t *planner) {
+    return planner->iterations;
+}

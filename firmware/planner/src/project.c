@@ -1,0 +1,80 @@
+#include "project.h"
+
+#include <tgmath.h>
+
+/** Where the row blocks of one problem begin. */
+typedef struct {
+    const taper_horizon_t *horizon;
+    const taper_real_t *taper_upper, *target_upper, *sum_upper;
+    taper_real_t power[TAPER_MAX_CONNECTORS]; /* u(i,t) of the step in work */
+} projection_t;
+
+static projection_t projection_of(const taper_horizon_t *horizon) {
+    const unsigned connectors = horizon->config->connector_count;
+    const unsigned steps = horizon->config->steps;
+    projection_t projection = {.horizon = horizon};
+    projection.taper_upper = horizon->upper + connectors * steps;
+    projection.target_upper = projection.taper_upper + connectors * (steps - 1);
+    projection.sum_upper = projection.target_upper + connectors;
+    return projection;
+}
+
+/** Power that connector i may have in step t after `charged` energy. */
+static taper_real_t allowed_power(const projection_t *projection, uint8_t i, uint8_t t, taper_real_t charged) {
+    const taper_horizon_t *horizon = projection->horizon;
+    const uint8_t steps = horizon->config->steps;
+    taper_real_t allowed = horizon->upper[(unsigned)i * steps + t];
+    if (t > 0) {
+        const taper_real_t slope = 1 - horizon->taper_keep[i];
+        allowed = fmin(allowed, projection->taper_upper[(unsigned)i * (steps - 1U) + t - 1] - slope * charged);
+    }
+    allowed = fmin(allowed, projection->target_upper[i] / TAPER_TARGET_SCALE - charged);
+    return fmax(allowed, 0);
+}
+
+/** Shrink the powers of a group so that their sum keeps its limit in step t. */
+static void shrink_group(projection_t *projection, uint8_t k, uint8_t t) {
+    const taper_station_config_t *config = projection->horizon->config;
+    taper_real_t sum = 0;
+    uint8_t members = 0;
+    for (uint8_t i = 0; i < config->connector_count; i++) {
+        if (taper_group_contains(config, k, i)) {
+            sum += projection->power[i];
+            members++;
+        }
+    }
+    if (members == 0) {
+        return;
+    }
+    const taper_real_t limit = projection->sum_upper[(unsigned)k * config->steps + t] / taper_horizon_sum_scale(members);
+    if (sum <= limit) {
+        return;
+    }
+    for (uint8_t i = 0; i < config->connector_count; i++) {
+        if (taper_group_contains(config, k, i)) {
+            projection->power[i] *= limit / sum;
+        }
+    }
+}
+
+void taper_project(const taper_horizon_t *horizon, OSQPFloat *x) {
+    projection_t projection = projection_of(horizon);
+    const taper_station_config_t *config = horizon->config;
+    const uint8_t steps = config->steps;
+    taper_real_t charged[TAPER_MAX_CONNECTORS] = {0}; /* after the last projected step */
+    taper_real_t solved[TAPER_MAX_CONNECTORS] = {0};  /* the same as the solver had it */
+    for (uint8_t t = 0; t < steps; t++) {
+        for (uint8_t i = 0; i < config->connector_count; i++) {
+            const taper_real_t wanted = x[(unsigned)i * steps + t] - solved[i];
+            solved[i] = x[(unsigned)i * steps + t];
+            projection.power[i] = fmin(fmax(wanted, 0), allowed_power(&projection, i, t, charged[i]));
+        }
+        for (uint8_t k = 0; k < config->group_count; k++) {
+            shrink_group(&projection, k, t);
+        }
+        for (uint8_t i = 0; i < config->connector_count; i++) {
+            charged[i] += projection.power[i];
+            x[(unsigned)i * steps + t] = charged[i];
+        }
+    }
+}

@@ -1,0 +1,14 @@
+/** Makes a solver's answer feasible. Private. */
+#ifndef TAPER_PROJECT_H
+#define TAPER_PROJECT_H
+
+#include "solver.h"
+
+/**
+ * Bring the energies `x` [connectors x steps] within every row of `horizon`, in place: forward in time, each power is
+ * limited by rate, taper and need, and where a group's sum is above its limit all its powers shrink in proportion.
+ * `x` must be finite. Cost: O(connectors x steps x groups).
+ */
+void taper_project(const taper_horizon_t *horizon, OSQPFloat *x);
+
+#endif

@@ -1,0 +1,116 @@
+/**
+ * The session table: what each connector and its vehicle last said, and what follows from it for planning.
+ *
+ * Reports go in with the time they were received; a snapshot comes out. A report that is too old counts as not made.
+ * The state of charge between and beyond reports is carried on by the measured energy, so a vehicle without SOC, or
+ * with a stale one, keeps being planned for.
+ *
+ * A session begins when a connector reports a vehicle (control pilot B, C or D) and EV_PARAM A, B and C agree on their
+ * revision, A and B on the session number. It ends when the connector reports no vehicle; another session number on the
+ * same connector begins a new one. A new revision of the parameters is used once it is whole; until then the old one.
+ */
+#ifndef TAPER_SESSION_H
+#define TAPER_SESSION_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "taper/message.h"
+#include "taper/types.h"
+
+/** Ages after which a report counts as absent [ms] (docs/protocol.md, timeouts). */
+#define TAPER_EVSE_STATUS_TIMEOUT_ms 1000
+#define TAPER_EV_STATUS_TIMEOUT_ms   2500
+#define TAPER_EVSE_ELEC_TIMEOUT_ms   5000
+#define TAPER_TIME_SYNC_TIMEOUT_ms   5000
+/** A reported SOC older than this is not used to correct the estimate [s]. So is one of unknown age. */
+#define TAPER_SOC_STALE_s 60
+/** Half the step of SOC on the wire (EV_STATUS): the estimate is kept this close to a fresh report [1/10 permille]. */
+#define TAPER_SOC_QUANTUM_tenth_permille 25
+/** A fresh SOC this much further than that from the estimate is a jump, not believed until it was repeated [permille]. */
+#define TAPER_SOC_JUMP_permille 20
+/** Consistent reports after which a jump is believed. */
+#define TAPER_SOC_JUMP_REPORTS 3
+/** Usable capacities outside this range are absurd and count as unknown [Wh]. */
+#define TAPER_CAPACITY_MIN_Wh 1000
+#define TAPER_CAPACITY_MAX_Wh 2000000
+/** Need assumed for a vehicle that told neither targets nor capacity: it takes until it says complete [Wh]. */
+#define TAPER_OPEN_NEED_Wh 100000
+/** What such a vehicle is offered at least, however full it is by our account [Wh]. */
+#define TAPER_OPEN_NEED_LEAST_Wh 1000
+/** Stay assumed for a vehicle that told no departure, or while the clock was never set [s]. */
+#define TAPER_DEFAULT_STAY_s (8 * 3600)
+
+/** One report and when it came. */
+typedef struct {
+    bool heard;
+    uint32_t at_ms;
+} taper_heard_t;
+
+/** A whole set of EV_PARAM frames. */
+typedef struct {
+    taper_ev_param_a_t a;
+    taper_ev_param_b_t b;
+    taper_ev_param_c_t c;
+    taper_ev_param_d_t d;
+} taper_ev_params_t;
+
+/** One connector. Private to the layer; in the header because the caller owns the memory. */
+typedef struct {
+    taper_heard_t status_heard, ev_heard, elec_heard;
+    taper_evse_status_t status;
+    taper_ev_status_t ev;
+    taper_evse_elec_t elec;
+    taper_ev_params_t received; /**< newest of each frame; they may disagree */
+    taper_ev_params_t used;     /**< last set that agreed; `d.taper_W` is absent unless D agreed as well */
+    uint8_t param_seen;         /**< bit 0: A .. bit 3: D received since the vehicle came */
+    bool vehicle_there;         /**< by the last EVSE_STATUS */
+    bool in_session;            /**< `used` is set */
+    bool wants_energy;          /**< `active` of its demand at the last report */
+    uint32_t plugged_in_ms;     /**< when the vehicle, or else the session, was first seen */
+    int32_t session_Wh;         /**< last energy measured in this session, or absent */
+    int32_t stored_Wh;          /**< estimate, absent until SOC and capacity are known */
+    int32_t anchor_Wh;          /**< session energy at which `stored_Wh` was right, absent until measured */
+    int32_t jump_permille;      /**< last SOC that was not believed */
+    uint8_t jump_count;         /**< reports that agreed on it, in a row */
+} taper_session_t;
+
+typedef struct {
+    const taper_station_config_t *config;
+    taper_session_t session[TAPER_MAX_CONNECTORS];
+    uint32_t unix_s;           /**< at `clock_heard.at_ms` */
+    taper_heard_t clock_heard; /**< the last TIME_SYNC with quality above 0; held over for ever */
+    uint32_t revision; /**< changes with what should make the planner think again: a session begins or ends,
+                                    parameters change, a vehicle starts or stops to want energy, or falls silent */
+} taper_session_table_t;
+
+/** Empty the table. `config` must outlive it. */
+void taper_session_init(taper_session_table_t *table, const taper_station_config_t *config);
+
+/**
+ * Take in one decoded message received at `now_ms`. Messages that do not concern sessions, or come from a node that
+ * the station does not have, are ignored. Cost: constant where connectors are numbered in the order of their nodes, else a scan for the index.
+ * @return whether the message was for this table.
+ */
+bool taper_session_apply(taper_session_table_t *table, const taper_message_t *message, uint32_t now_ms);
+
+/**
+ * Forget reports past their timeout, so that a silent connector changes `revision`, and carry the clock on.
+ * Call it once per control tick, before the snapshot; at least once a day. Cost: O(connectors).
+ */
+void taper_session_expire(taper_session_table_t *table, uint32_t now_ms);
+
+/**
+ * What every vehicle wants at `now_ms`. Reports past their timeout do not count; what a vehicle asked for (complete,
+ * pause, stop) and its error hold until it says otherwise, since vehicles that are done fall asleep.
+ * Demands that are not active are all zero. Cost: O(connectors).
+ */
+void taper_session_snapshot(const taper_session_table_t *table, uint32_t now_ms, taper_snapshot_t *snapshot);
+
+/** Index of the connector at (`bus`, `node`), or -1. */
+int taper_session_connector(const taper_station_config_t *config, uint8_t bus, uint8_t node);
+
+/** Wire number of the session on a connector, for SETPOINT; 0 if there is none. */
+uint8_t taper_session_number(const taper_session_table_t *table, uint8_t connector);
+
+#endif

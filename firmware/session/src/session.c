@@ -1,0 +1,232 @@
+/* Reports into the table: who is there, and which parameters are in use. */
+#include "taper/session.h"
+
+#include <string.h>
+
+#include "session_internal.h"
+
+#define PARAM_A 0x1u
+#define PARAM_B 0x2u
+#define PARAM_C 0x4u
+#define PARAM_D 0x8u
+
+/* The clock is moved on before its anchor is half a wrap of the millisecond counter away. */
+#define CLOCK_CARRY_ms (3600u * 1000u)
+
+/* Nothing of a vehicle that left, or was replaced, may reach the next one. */
+static void forget_vehicle(taper_session_t *session) {
+    const taper_session_t blank = {
+        .status_heard = session->status_heard,
+        .status = session->status,
+        .session_Wh = TAPER_ABSENT,
+        .stored_Wh = TAPER_ABSENT,
+        .anchor_Wh = TAPER_ABSENT,
+    };
+    *session = blank;
+}
+
+void taper_session_init(taper_session_table_t *table, const taper_station_config_t *config) {
+    memset(table, 0, sizeof *table);
+    table->config = config;
+    for (uint8_t i = 0; i < config->connector_count; i++) {
+        forget_vehicle(&table->session[i]);
+    }
+}
+
+int taper_session_connector(const taper_station_config_t *config, uint8_t bus, uint8_t node) {
+    const int guess = bus * TAPER_NODES_PER_BUS + node - 1;
+    if (guess >= 0 && guess < config->connector_count && config->connectors[guess].bus == bus &&
+        config->connectors[guess].node == node) {
+        return guess;
+    }
+    for (int i = 0; i < config->connector_count; i++) {
+        if (config->connectors[i].bus == bus && config->connectors[i].node == node) {
+            return i;
+        }
+    }
+    return -1;
+}
+
+uint8_t taper_session_number(const taper_session_table_t *table, uint8_t connector) {
+    if (connector >= table->config->connector_count || !table->session[connector].in_session) {
+        return 0;
+    }
+    return table->session[connector].used.a.session;
+}
+
+static void hear(taper_heard_t *heard, uint32_t now_ms) {
+    heard->heard = true;
+    heard->at_ms = now_ms;
+}
+
+static bool set_is_whole(const taper_session_t *session) {
+    const taper_ev_params_t *p = &session->received;
+    const unsigned needed = PARAM_A | PARAM_B | PARAM_C;
+    return (session->param_seen & needed) == needed && p->a.revision == p->b.revision &&
+           p->a.revision == p->c.revision && p->a.session == p->b.session;
+}
+
+/* The taper that belongs to the received set, or absent. */
+static int32_t matching_taper_W(const taper_session_t *session) {
+    const taper_ev_params_t *p = &session->received;
+    const bool matches = (session->param_seen & PARAM_D) != 0u && p->d.revision == p->a.revision &&
+                         p->d.session == p->a.session;
+    return matches ? p->d.taper_W : TAPER_ABSENT;
+}
+
+/* A vehicle was plugged in, or replaced by another session number. What was reported before was not about it; only its
+   parameters may have come ahead of the news. */
+static void begin_stay(taper_session_t *session, uint32_t now_ms) {
+    const taper_ev_params_t received = session->received;
+    const uint8_t param_seen = session->param_seen;
+    forget_vehicle(session);
+    session->received = received;
+    session->param_seen = param_seen;
+    session->vehicle_there = true;
+    session->plugged_in_ms = now_ms;
+}
+
+/* Put the received parameters into use if they are whole; that may begin a session. */
+static void use_parameters(taper_session_table_t *table, taper_session_t *session, uint32_t now_ms) {
+    const bool can_begin = session->vehicle_there && taper_session_pilot_charges(session->status.pilot);
+    if (!set_is_whole(session) || !(session->in_session || can_begin)) {
+        return;
+    }
+    if (session->in_session && session->received.a.session != session->used.a.session) {
+        begin_stay(session, now_ms);
+    }
+    const int32_t taper_W = matching_taper_W(session);
+    if (!session->in_session || session->received.a.revision != session->used.a.revision ||
+        taper_W != session->used.d.taper_W) {
+        table->revision++;
+    }
+    const int32_t old_capacity_Wh = taper_session_capacity_Wh(session);
+    session->used = session->received;
+    session->used.d.taper_W = taper_W;
+    session->in_session = true;
+    taper_session_estimate_parameters(session, old_capacity_Wh, now_ms);
+}
+
+static void apply_status(taper_session_table_t *table, taper_session_t *session,
+                         const taper_evse_status_t *status, uint32_t now_ms) {
+    session->status = *status;
+    hear(&session->status_heard, now_ms);
+    if (!status->ev_present || status->pilot == TAPER_PILOT_A) {
+        if (session->in_session) {
+            table->revision++;
+        }
+        forget_vehicle(session);
+        return;
+    }
+    if (!session->vehicle_there) {
+        begin_stay(session, now_ms);
+    }
+    if (!session->in_session) {
+        use_parameters(table, session, now_ms);
+    }
+}
+
+static void apply_ev(taper_session_t *session, const taper_ev_status_t *ev, uint32_t now_ms) {
+    session->ev = *ev;
+    hear(&session->ev_heard, now_ms);
+    taper_session_estimate_soc(session, now_ms);
+}
+
+static void apply_elec(taper_session_t *session, const taper_evse_elec_t *elec, uint32_t now_ms) {
+    session->elec = *elec;
+    hear(&session->elec_heard, now_ms);
+    if (elec->energy_Wh != TAPER_ABSENT) {
+        session->session_Wh = elec->energy_Wh;
+        taper_session_estimate_energy(session);
+    }
+}
+
+static void apply_parameters(taper_session_table_t *table, taper_session_t *session,
+                             const taper_message_t *message, uint32_t now_ms) {
+    unsigned part = 0;
+    switch (message->kind) {
+    case TAPER_MESSAGE_EV_PARAM_A:
+        session->received.a = message->as.ev_param_a;
+        part = PARAM_A;
+        break;
+    case TAPER_MESSAGE_EV_PARAM_B:
+        session->received.b = message->as.ev_param_b;
+        part = PARAM_B;
+        break;
+    case TAPER_MESSAGE_EV_PARAM_C:
+        session->received.c = message->as.ev_param_c;
+        part = PARAM_C;
+        break;
+    default:
+        session->received.d = message->as.ev_param_d;
+        part = PARAM_D;
+        break;
+    }
+    session->param_seen = (uint8_t)(session->param_seen | part);
+    use_parameters(table, session, now_ms);
+}
+
+static void apply_time(taper_session_table_t *table, const taper_time_sync_t *time, uint32_t now_ms) {
+    if (time->quality == 0) {
+        return; /* a gateway that lost its own clock does not take ours away */
+    }
+    table->unix_s = time->unix_s;
+    hear(&table->clock_heard, now_ms - time->ms);
+}
+
+/* A vehicle that starts or stops to want energy is an event for the planner, whatever the cause. */
+static void note_activity(taper_session_table_t *table, uint8_t connector, uint32_t now_ms) {
+    taper_demand_t demand;
+    const bool active = taper_session_demand(table, connector, now_ms, &demand);
+    if (active != table->session[connector].wants_energy) {
+        table->session[connector].wants_energy = active;
+        table->revision++;
+    }
+}
+
+bool taper_session_apply(taper_session_table_t *table, const taper_message_t *message, uint32_t now_ms) {
+    if (message->kind == TAPER_MESSAGE_TIME_SYNC) {
+        apply_time(table, &message->as.time_sync, now_ms);
+        return true;
+    }
+    const int index = taper_session_connector(table->config, message->bus, message->node);
+    if (index < 0) {
+        return false;
+    }
+    taper_session_t *session = &table->session[index];
+    switch (message->kind) {
+    case TAPER_MESSAGE_EVSE_STATUS: apply_status(table, session, &message->as.evse_status, now_ms); break;
+    case TAPER_MESSAGE_EV_STATUS: apply_ev(session, &message->as.ev_status, now_ms); break;
+    case TAPER_MESSAGE_EVSE_ELEC: apply_elec(session, &message->as.evse_elec, now_ms); break;
+    case TAPER_MESSAGE_EV_PARAM_A:
+    case TAPER_MESSAGE_EV_PARAM_B:
+    case TAPER_MESSAGE_EV_PARAM_C:
+    case TAPER_MESSAGE_EV_PARAM_D: apply_parameters(table, session, message, now_ms); break;
+    default: return false;
+    }
+    note_activity(table, (uint8_t)index, now_ms);
+    return true;
+}
+
+static void expire(taper_heard_t *heard, uint32_t now_ms, uint32_t timeout_ms) {
+    heard->heard = taper_session_is_fresh(*heard, now_ms, timeout_ms);
+}
+
+static void carry_clock(taper_session_table_t *table, uint32_t now_ms) {
+    const uint32_t elapsed_ms = taper_elapsed_ms(now_ms, table->clock_heard.at_ms);
+    if (table->clock_heard.heard && elapsed_ms >= CLOCK_CARRY_ms) {
+        table->unix_s += elapsed_ms / 1000u;
+        table->clock_heard.at_ms += elapsed_ms / 1000u * 1000u;
+    }
+}
+
+void taper_session_expire(taper_session_table_t *table, uint32_t now_ms) {
+    carry_clock(table, now_ms);
+    for (uint8_t i = 0; i < table->config->connector_count; i++) {
+        taper_session_t *session = &table->session[i];
+        expire(&session->status_heard, now_ms, TAPER_EVSE_STATUS_TIMEOUT_ms);
+        expire(&session->ev_heard, now_ms, TAPER_EV_STATUS_TIMEOUT_ms);
+        expire(&session->elec_heard, now_ms, TAPER_EVSE_ELEC_TIMEOUT_ms);
+        note_activity(table, i, now_ms);
+    }
+}

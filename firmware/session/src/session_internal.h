@@ -1,0 +1,39 @@
+/** Private to the session layer. */
+#ifndef TAPER_SESSION_INTERNAL_H
+#define TAPER_SESSION_INTERNAL_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "taper/session.h"
+
+/** Whether a report was made, and no longer than `timeout_ms` ago. */
+static inline bool taper_session_is_fresh(taper_heard_t heard, uint32_t now_ms, uint32_t timeout_ms) {
+    return heard.heard && taper_elapsed_ms(now_ms, heard.at_ms) <= timeout_ms;
+}
+
+/** Control pilot with a vehicle that can be charged. */
+static inline bool taper_session_pilot_charges(taper_pilot_t pilot) {
+    return pilot == TAPER_PILOT_B || pilot == TAPER_PILOT_C || pilot == TAPER_PILOT_D;
+}
+
+/** Capacity of the vehicle in session; 0 if it is unknown or absurd. */
+int32_t taper_session_capacity_Wh(const taper_session_t *session);
+
+/** Whether EV_STATUS gives a SOC that may correct the estimate at `now_ms`. */
+bool taper_session_soc_is_fresh(const taper_session_t *session, uint32_t now_ms);
+
+/** Parameters were put into use: begin the estimate, or carry it over from `old_capacity_Wh`. */
+void taper_session_estimate_parameters(taper_session_t *session, int32_t old_capacity_Wh, uint32_t now_ms);
+
+/** An EVSE_ELEC came: move the estimate by the energy since the last one. */
+void taper_session_estimate_energy(taper_session_t *session);
+
+/** An EV_STATUS came: correct the estimate by its SOC. */
+void taper_session_estimate_soc(taper_session_t *session, uint32_t now_ms);
+
+/** Fill in `demand`; all zero unless active. @return `demand->active`. */
+bool taper_session_demand(const taper_session_table_t *table, uint8_t connector, uint32_t now_ms,
+                          taper_demand_t *demand);
+
+#endif

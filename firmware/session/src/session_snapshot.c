@@ -1,0 +1,166 @@
+/* What each vehicle wants at one instant. */
+#include <string.h>
+
+#include "session_internal.h"
+
+/* Unix minutes on the wire count modulo this (EV_PARAM_B). */
+#define DEPARTURE_MODULUS_min 65535
+
+static int32_t round_down_to_step(int32_t current_mA) {
+    return current_mA - current_mA % TAPER_CURRENT_STEP_mA;
+}
+
+static bool may_charge(const taper_session_t *session, uint32_t now_ms) {
+    const taper_ev_status_t *ev = &session->ev;
+    if (!session->in_session ||
+        !taper_session_is_fresh(session->status_heard, now_ms, TAPER_EVSE_STATUS_TIMEOUT_ms)) {
+        return false;
+    }
+    if (!taper_session_pilot_charges(session->status.pilot) || session->status.fault || ev->error != 0) {
+        return false;
+    }
+    return !ev->complete && !ev->pause_requested && !ev->stop_requested;
+}
+
+static int32_t max_current_mA(const taper_connector_config_t *connector, const taper_session_t *session,
+                              uint32_t now_ms) {
+    int32_t max_mA = connector->max_mA;
+    const bool ev_fresh = taper_session_is_fresh(session->ev_heard, now_ms, TAPER_EV_STATUS_TIMEOUT_ms);
+    if (ev_fresh && session->ev.max_mA != TAPER_ABSENT) {
+        max_mA = taper_min_i32(max_mA, session->ev.max_mA);
+    }
+    return round_down_to_step(max_mA);
+}
+
+static int32_t min_current_mA(const taper_connector_config_t *connector, const taper_session_t *session) {
+    if (connector->min_mA == 0) {
+        return 0; /* the station asked for continuous currents: a study, or DC */
+    }
+    /* An absent minimum is below any other. */
+    const int32_t min_mA = taper_max_i32(connector->min_mA, session->used.b.min_mA);
+    return round_down_to_step(min_mA + TAPER_CURRENT_STEP_mA - 1);
+}
+
+/* Booked by the higher of nominal and measured voltage: too little power offered rather than too much drawn. */
+static int32_t watts_per_ampere(const taper_connector_config_t *connector, const taper_session_t *session,
+                                uint32_t now_ms) {
+    int32_t voltage_mV = connector->voltage_mV;
+    if (taper_session_is_fresh(session->elec_heard, now_ms, TAPER_EVSE_ELEC_TIMEOUT_ms)) {
+        voltage_mV = taper_max_i32(voltage_mV, session->elec.voltage_mV); /* absent is below any other */
+    }
+    int32_t phases = connector->phases;
+    if (session->status.phases > 0) {
+        phases = taper_min_i32(phases, session->status.phases);
+    }
+    return phases * ((voltage_mV + 999) / 1000);
+}
+
+/* minimum <= target <= maximum, repaired by moving the target; where the bounds contradict, the maximum holds. */
+static int32_t repaired_target(int32_t target, int32_t minimum, int32_t maximum) {
+    if (target == TAPER_ABSENT) {
+        return TAPER_ABSENT;
+    }
+    const int32_t raised = taper_max_i32(target, minimum); /* absent is below any other */
+    return maximum == TAPER_ABSENT ? raised : taper_min_i32(raised, maximum);
+}
+
+/* Need of a vehicle that named no target: it takes until it says complete, so our account of its battery must not end
+   it. Its own maximum may. */
+static int64_t open_need_Wh(const taper_session_t *session, int32_t charged_Wh) {
+    const int32_t capacity_Wh = taper_session_capacity_Wh(session);
+    if (session->used.c.maximum_Wh != TAPER_ABSENT) {
+        return (int64_t)session->used.c.maximum_Wh - charged_Wh;
+    }
+    if (capacity_Wh == 0) {
+        return TAPER_OPEN_NEED_Wh;
+    }
+    const int32_t held_Wh = session->stored_Wh == TAPER_ABSENT ? charged_Wh : session->stored_Wh;
+    return taper_max_i32(capacity_Wh - held_Wh, TAPER_OPEN_NEED_LEAST_Wh);
+}
+
+static int32_t need_Wh(const taper_session_t *session) {
+    const taper_ev_param_a_t *a = &session->used.a;
+    const taper_ev_param_c_t *c = &session->used.c;
+    const int32_t charged_Wh = session->session_Wh == TAPER_ABSENT ? 0 : session->session_Wh;
+    const int32_t target_Wh = repaired_target(c->target_Wh, c->minimum_Wh, c->maximum_Wh);
+    if (target_Wh != TAPER_ABSENT) {
+        return taper_saturate_i32((int64_t)target_Wh - charged_Wh);
+    }
+    const int32_t soc_permille =
+        repaired_target(a->soc_target_permille, a->soc_minimum_permille, TAPER_ABSENT);
+    if (soc_permille != TAPER_ABSENT && session->stored_Wh != TAPER_ABSENT) {
+        const int64_t wanted_Wh = (int64_t)soc_permille * taper_session_capacity_Wh(session) / 1000;
+        return taper_saturate_i32(wanted_Wh - session->stored_Wh);
+    }
+    return taper_saturate_i32(open_need_Wh(session, charged_Wh));
+}
+
+/* The minutes are known modulo 65535: of the possible departures, the one nearest to now, up to 22 days either way. */
+static int32_t departure_in_s(int32_t departure_min, uint32_t unix_s) {
+    const int32_t now_min = (int32_t)(unix_s / 60u % DEPARTURE_MODULUS_min);
+    int32_t ahead_min = (departure_min - now_min + DEPARTURE_MODULUS_min) % DEPARTURE_MODULUS_min;
+    if (ahead_min > DEPARTURE_MODULUS_min / 2) {
+        ahead_min -= DEPARTURE_MODULUS_min;
+    }
+    return ahead_min * 60 - (int32_t)(unix_s % 60u);
+}
+
+static int32_t departs_in_s(const taper_session_table_t *table, const taper_session_t *session,
+                            uint32_t now_ms) {
+    const int32_t departure_min = session->used.b.departure_min;
+    if (!table->clock_heard.heard || departure_min == TAPER_ABSENT) {
+        const uint32_t here_s = taper_elapsed_ms(now_ms, session->plugged_in_ms) / 1000u;
+        return TAPER_DEFAULT_STAY_s - (int32_t)here_s;
+    }
+    const uint32_t held_over_s = taper_elapsed_ms(now_ms, table->clock_heard.at_ms) / 1000u;
+    return departure_in_s(departure_min, table->unix_s + held_over_s);
+}
+
+/* Battery and taper, for a demand whose currents are set. */
+static void fill_battery(taper_demand_t *demand, const taper_session_t *session, uint32_t now_ms) {
+    const bool believed = session->jump_count == 0 && taper_session_soc_is_fresh(session, now_ms);
+    demand->soc_estimated = !believed;
+    demand->capacity_Wh = taper_session_capacity_Wh(session);
+    demand->stored_Wh = taper_max_i32(session->stored_Wh, 0); /* absent becomes 0 */
+    demand->peak_W = session->used.b.peak_W;
+    if (demand->peak_W == TAPER_ABSENT) {
+        demand->peak_W = taper_saturate_i32((int64_t)demand->max_mA * demand->W_per_A / 1000);
+    }
+    if (demand->capacity_Wh > 0) {
+        demand->taper_W = taper_clamp_i32(session->used.d.taper_W, 0, demand->peak_W); /* absent becomes 0 */
+    }
+}
+
+bool taper_session_demand(const taper_session_table_t *table, uint8_t connector, uint32_t now_ms,
+                          taper_demand_t *demand) {
+    const taper_connector_config_t *config = &table->config->connectors[connector];
+    const taper_session_t *session = &table->session[connector];
+    memset(demand, 0, sizeof *demand);
+    if (!may_charge(session, now_ms)) {
+        return false;
+    }
+    const int32_t wanted_Wh = need_Wh(session);
+    const int32_t max_mA = max_current_mA(config, session, now_ms);
+    const int32_t min_mA = min_current_mA(config, session);
+    const int32_t W_per_A = watts_per_ampere(config, session, now_ms);
+    if (wanted_Wh <= 0 || max_mA <= 0 || min_mA > max_mA || W_per_A <= 0) {
+        return false;
+    }
+    demand->active = true;
+    demand->session = session->used.a.session;
+    demand->need_Wh = wanted_Wh;
+    demand->max_mA = max_mA;
+    demand->min_mA = min_mA;
+    demand->W_per_A = W_per_A;
+    demand->departs_in_s = departs_in_s(table, session, now_ms);
+    fill_battery(demand, session, now_ms);
+    return true;
+}
+
+void taper_session_snapshot(const taper_session_table_t *table, uint32_t now_ms, taper_snapshot_t *snapshot) {
+    snapshot->now_ms = now_ms;
+    snapshot->count = table->config->connector_count;
+    for (uint8_t i = 0; i < snapshot->count; i++) {
+        (void)taper_session_demand(table, i, now_ms, &snapshot->demand[i]);
+    }
+}

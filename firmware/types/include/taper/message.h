@@ -1,0 +1,169 @@
+/**
+ * The station bus after decoding: one struct per frame of `codegen/taper.dbc`, in integers with units.
+ *
+ * A field that its sender left out, or that was outside the range of the DBC, is TAPER_ABSENT. Everything else is in
+ * the range given here: this is the trust boundary, the layers above check no range again.
+ */
+#ifndef TAPER_MESSAGE_H
+#define TAPER_MESSAGE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/** Function codes: `id = function << 6 | node`. */
+typedef enum {
+    TAPER_MESSAGE_SITE_LIMIT = 0x02,
+    TAPER_MESSAGE_SETPOINT = 0x03,
+    TAPER_MESSAGE_EVSE_STATUS = 0x04,
+    TAPER_MESSAGE_EV_STATUS = 0x05,
+    TAPER_MESSAGE_EVSE_ELEC = 0x06,
+    TAPER_MESSAGE_TIME_SYNC = 0x08,
+    TAPER_MESSAGE_CTRL_STATUS = 0x09,
+    TAPER_MESSAGE_EV_PARAM_A = 0x0A,
+    TAPER_MESSAGE_EV_PARAM_B = 0x0B,
+    TAPER_MESSAGE_EV_PARAM_C = 0x0C,
+    TAPER_MESSAGE_EV_PARAM_D = 0x10,
+} taper_message_kind_t;
+
+#define TAPER_NODE_CONTROLLER 0
+#define TAPER_NODE_GATEWAY 62
+
+/** Control-pilot states of IEC 61851-1, as EVSE_STATUS carries them. */
+typedef enum {
+    TAPER_PILOT_A = 0, /**< no vehicle */
+    TAPER_PILOT_B = 1, /**< vehicle, not ready */
+    TAPER_PILOT_C = 2, /**< vehicle, ready */
+    TAPER_PILOT_D = 3, /**< vehicle, ready, ventilation required */
+    TAPER_PILOT_E = 4, /**< no supply */
+    TAPER_PILOT_F = 5, /**< fault */
+} taper_pilot_t;
+
+typedef enum {
+    TAPER_COMMAND_PAUSE = 0,
+    TAPER_COMMAND_CHARGE = 1,
+    TAPER_COMMAND_STOP = 2,
+    TAPER_COMMAND_EMERGENCY = 15,
+} taper_command_t;
+
+/** SITE_LIMIT, gateway to controller, 1 s; the gateway's heartbeat. */
+typedef struct {
+    bool active;         /**< the limit below is in force */
+    int32_t limit_W;     /**< -3 276 700..3 276 700, or absent */
+    int32_t failsafe_W;  /**< likewise */
+    int32_t validity_s;  /**< 0..254, or absent */
+} taper_site_limit_t;
+
+/** SETPOINT, controller to connector, 500 ms and on change. */
+typedef struct {
+    taper_command_t command;
+    int32_t current_mA;  /**< 0..6 553 400 */
+    int32_t validity_ms; /**< 0..127 000; afterwards the connector falls back by itself */
+    int32_t fallback_mA; /**< 0..127 000 */
+    uint8_t phase_mask;  /**< bit 0: L1 .. bit 2: L3 */
+    uint8_t session;
+} taper_setpoint_t;
+
+/** EVSE_STATUS, connector to controller, 200 ms; the connector's heartbeat. */
+typedef struct {
+    taper_pilot_t pilot;
+    int32_t current_mA[3]; /**< 0..409 400 per phase, or absent */
+    bool contactor_closed;
+    bool locked;
+    bool fault;
+    bool derated;
+    bool fallback_active;
+    bool ev_present;
+    uint8_t setpoint_echo; /**< counter of the last accepted SETPOINT, 0..15 */
+    uint8_t phases;        /**< phases in use, 0..3 */
+} taper_evse_status_t;
+
+/** EV_STATUS, connector to controller, 500 ms. */
+typedef struct {
+    uint8_t error;          /**< 0: none */
+    int32_t soc_permille;   /**< 0..1000 in steps of 5, or absent */
+    int32_t soc_age_s;      /**< 0..254, or absent */
+    int32_t max_mA;         /**< 0..6 553 400, the vehicle's own limit, or absent */
+    bool complete;          /**< the vehicle has what it wanted */
+    bool ready;
+    bool pause_requested;
+    bool stop_requested;
+} taper_ev_status_t;
+
+/** EVSE_ELEC, connector to controller, 1 s. */
+typedef struct {
+    int32_t voltage_mV; /**< 0..6 553 400, or absent */
+    int32_t power_W;    /**< 0..655 340, or absent */
+    int32_t energy_Wh;  /**< 0..655 340 since the session began, or absent */
+} taper_evse_elec_t;
+
+/** TIME_SYNC, gateway to all, 1 s. */
+typedef struct {
+    uint32_t unix_s;
+    uint16_t ms;
+    uint8_t quality; /**< 0: the clock was never set */
+} taper_time_sync_t;
+
+/** CTRL_STATUS, controller to all, 1 s. */
+typedef struct {
+    uint8_t mode;           /**< taper_mode_t */
+    uint8_t verdict;        /**< taper_verdict_t of the last plan */
+    uint8_t solve_ticks;    /**< control ticks that the last plan took */
+    uint16_t iterations;    /**< of the last plan, 0..510 in steps of 2 */
+    uint8_t active;         /**< vehicles that want energy */
+    uint8_t waiting;        /**< of these, without current */
+    uint8_t plan_version;   /**< counts plans */
+} taper_ctrl_status_t;
+
+/** EV_PARAM_A, connector to controller, 2 s and on change. */
+typedef struct {
+    uint8_t revision; /**< 0..15, changes with any of A..D and with every new session */
+    uint8_t session;
+    int32_t capacity_Wh;          /**< 100..6 553 400, or absent */
+    int32_t soc_target_permille;  /**< 0..1000, or absent */
+    int32_t soc_minimum_permille; /**< 0..1000, or absent */
+    int32_t soc_plug_in_permille; /**< 0..1000, or absent */
+} taper_ev_param_a_t;
+
+typedef struct {
+    uint8_t revision;
+    uint8_t session;
+    int32_t departure_min; /**< 0..65534: Unix minutes modulo 65535, or absent */
+    int32_t peak_W;        /**< 0..655 340: most the vehicle takes at SOC 0, or absent */
+    int32_t min_mA;        /**< 0..127 000, or absent */
+} taper_ev_param_b_t;
+
+typedef struct {
+    uint8_t revision;
+    int32_t target_Wh;  /**< -655 340..655 340: energy wanted since plug-in, or absent */
+    int32_t maximum_Wh; /**< likewise */
+    int32_t minimum_Wh; /**< likewise */
+} taper_ev_param_c_t;
+
+/** EV_PARAM_D: the taper. ISO 15118 does not carry it; a connector that knows the vehicle's curve tells it here. */
+typedef struct {
+    uint8_t revision;
+    uint8_t session;
+    int32_t taper_W; /**< 0..655 340: fall of the maximum power from SOC 0 to SOC 1, or absent: unknown */
+} taper_ev_param_d_t;
+
+/** One decoded frame. */
+typedef struct {
+    taper_message_kind_t kind;
+    uint8_t bus;
+    uint8_t node;
+    union {
+        taper_site_limit_t site_limit;
+        taper_setpoint_t setpoint;
+        taper_evse_status_t evse_status;
+        taper_ev_status_t ev_status;
+        taper_evse_elec_t evse_elec;
+        taper_time_sync_t time_sync;
+        taper_ctrl_status_t ctrl_status;
+        taper_ev_param_a_t ev_param_a;
+        taper_ev_param_b_t ev_param_b;
+        taper_ev_param_c_t ev_param_c;
+        taper_ev_param_d_t ev_param_d;
+    } as;
+} taper_message_t;
+
+#endif

@@ -1,0 +1,170 @@
+/**
+ * Words that every layer shares: status codes, time, the station's description, demands, proposals and setpoints.
+ *
+ * Units stand in the names. Everything here is an integer; floating point lives in battery, horizon and planner only.
+ * The array bounds (TAPER_MAX_...) come from the stations that the image is built for (`taper/sizes.h`, generated).
+ */
+#ifndef TAPER_TYPES_H
+#define TAPER_TYPES_H
+
+#include <limits.h>
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "taper/sizes.h"
+
+/** What a call answers: 0 or one of these. Never mixed with counters (the world) or verdicts (the solver). */
+typedef enum {
+    TAPER_OK = 0,
+    TAPER_ERR_ARGUMENT = -1, /**< an argument outside its documented range */
+    TAPER_ERR_CONFIG = -2,   /**< the station's description contradicts itself or this image's sizes */
+} taper_status_t;
+
+/** Connectors on one CAN bus: nodes 1..60 (the id has six bits, 0 is the controller, 62 and 63 are taken). */
+#define TAPER_NODES_PER_BUS 60
+/** Parent of the root group. */
+#define TAPER_NO_GROUP UINT8_MAX
+/** A quantity that a sender did not give. Never a legal value of any field. */
+#define TAPER_ABSENT INT32_MIN
+/** Step of every setpoint on the wire [mA] (SETPOINT, 0.1 A). */
+#define TAPER_CURRENT_STEP_mA 100
+/** Steps of the known site limit that a station keeps. */
+#define TAPER_MAX_LIMIT_POINTS 384
+
+_Static_assert(TAPER_MAX_CONNECTORS >= 1 && TAPER_MAX_CONNECTORS <= 240, "a connector index is one byte");
+_Static_assert(TAPER_MAX_GROUPS >= 1 && TAPER_MAX_GROUPS < TAPER_NO_GROUP, "a group index is one byte");
+
+/**
+ * Whether `a` is at or after `b` on the wrapping millisecond clock.
+ * Right while the two are less than 2^31 ms (24.8 days) apart.
+ */
+static inline bool taper_time_reached(uint32_t a_ms, uint32_t b_ms) {
+    return (uint32_t)(a_ms - b_ms) < UINT32_C(0x80000000);
+}
+
+/** @return the time from `since_ms` to `now_ms`, for a `since_ms` that is not in the future. */
+static inline uint32_t taper_elapsed_ms(uint32_t now_ms, uint32_t since_ms) {
+    return now_ms - since_ms;
+}
+
+static inline int32_t taper_min_i32(int32_t a, int32_t b) {
+    return a < b ? a : b;
+}
+
+static inline int32_t taper_max_i32(int32_t a, int32_t b) {
+    return a > b ? a : b;
+}
+
+/** @return `value` limited to [low, high]. */
+static inline int32_t taper_clamp_i32(int32_t value, int32_t low, int32_t high) {
+    return taper_min_i32(taper_max_i32(value, low), high);
+}
+
+/** @return `value` limited to what an int32_t holds, without reaching TAPER_ABSENT. */
+static inline int32_t taper_saturate_i32(int64_t value) {
+    if (value > INT32_MAX) {
+        return INT32_MAX;
+    }
+    return value < -INT32_MAX ? -INT32_MAX : (int32_t)value;
+}
+
+/** Add one to a counter that never falls and never wraps. */
+static inline void taper_count(uint32_t *counter) {
+    if (*counter != UINT32_MAX) {
+        (*counter)++;
+    }
+}
+
+/** One connector as the station file describes it. Constant. */
+typedef struct {
+    int32_t min_mA;     /**< least current that can be offered (IEC 61851-1: 6 A on AC); 0: continuous */
+    int32_t max_mA;     /**< hardware and cable limit, per phase */
+    int32_t voltage_mV; /**< nominal voltage, phase to neutral on AC */
+    uint8_t phases;     /**< 1 or 3 on AC, 1 on DC */
+    uint8_t group;      /**< innermost group of the feeder tree */
+    uint8_t bus;        /**< CAN bus, from 0 */
+    uint8_t node;       /**< node on that bus, 1..TAPER_NODES_PER_BUS */
+    bool is_dc;
+} taper_connector_config_t;
+
+/** One node of the feeder tree. Group 0 is the site; a parent always stands before its children. */
+typedef struct {
+    int32_t limit_W;
+    uint8_t parent; /**< TAPER_NO_GROUP for group 0 */
+} taper_group_config_t;
+
+/** A station: what codegen makes of `codegen/stations/NAME.toml`. Constant, in flash. */
+typedef struct {
+    const char *name;
+    const taper_connector_config_t *connectors; /**< [connector_count] */
+    const taper_group_config_t *groups;         /**< [group_count] */
+    int32_t failsafe_W;                         /**< site limit while the gateway is silent */
+    uint32_t tick_ms;                           /**< control tick */
+    uint32_t min_on_ms;                         /**< a connector that was switched on stays on this long */
+    uint32_t min_off_ms;                        /**< and off this long, for the contactor's and vehicle's sake */
+    uint16_t step_s;                            /**< length of a planning step */
+    uint8_t steps;                              /**< planning steps, the horizon */
+    uint8_t connector_count;
+    uint8_t group_count;
+} taper_station_config_t;
+
+/** One vehicle's demand at the instant of a snapshot. Meaningless unless `active`. */
+typedef struct {
+    bool active;         /**< a vehicle is there, is sound, and still wants energy */
+    bool soc_estimated;  /**< `stored_Wh` rests on measured energy because the reported SOC is stale */
+    uint8_t session;     /**< wire number of the session on this connector */
+    int32_t stored_Wh;   /**< energy in the battery, >= 0; 0 if SOC or capacity is unknown */
+    int32_t capacity_Wh; /**< > 0, or 0: unknown (no taper then) */
+    int32_t need_Wh;     /**< energy still wanted, > 0 */
+    int32_t peak_W;      /**< what the vehicle takes at SOC 0, >= 0 */
+    int32_t taper_W;     /**< fall of that from SOC 0 to SOC 1, 0..peak_W */
+    int32_t max_mA;      /**< least of connector and vehicle limit, per phase */
+    int32_t min_mA;      /**< greatest of connector and vehicle minimum */
+    int32_t W_per_A;     /**< power of 1 A on each phase in use, > 0 */
+    int32_t departs_in_s; /**< time to the departure that the vehicle told; <= 0: it has passed */
+} taper_demand_t;
+
+/** All demands at one instant: the only thing that horizon and fallback see of the world. */
+typedef struct {
+    uint32_t now_ms;
+    uint8_t count; /**< connectors of the station */
+    taper_demand_t demand[TAPER_MAX_CONNECTORS];
+} taper_snapshot_t;
+
+/** From `time_ms` on, until the next point, the site may draw `limit_W`. */
+typedef struct {
+    uint32_t time_ms;
+    int32_t limit_W;
+} taper_limit_point_t;
+
+/** Known course of the site limit, times ascending. Before its first point it says nothing. */
+typedef struct {
+    uint16_t count;
+    taper_limit_point_t point[TAPER_MAX_LIMIT_POINTS];
+} taper_limit_curve_t;
+
+/**
+ * What a planner or a fallback asks for. It binds nobody: any bit pattern is safe, the allocator bounds it.
+ * Connectors are served in the order of `rank`; each gets its wish if there is room, and what is left over then goes,
+ * in the same order, up to the ceilings.
+ */
+typedef struct {
+    int32_t wish_W[TAPER_MAX_CONNECTORS];
+    int32_t ceiling_W[TAPER_MAX_CONNECTORS]; /**< most that is of use; below the wish it counts as the wish */
+    uint8_t rank[TAPER_MAX_CONNECTORS];      /**< a permutation of 0..count-1, first served first */
+} taper_proposal_t;
+
+/** The allocator's answer: current per phase for each connector, a multiple of TAPER_CURRENT_STEP_mA. */
+typedef struct {
+    int32_t current_mA[TAPER_MAX_CONNECTORS];
+} taper_setpoints_t;
+
+/** Modes of the station, on the bus in CTRL_STATUS. */
+typedef enum {
+    TAPER_MODE_INIT = 0,     /**< no limit heard yet: nothing charges */
+    TAPER_MODE_PLAN = 1,     /**< the configured policy is followed */
+    TAPER_MODE_FALLBACK = 2, /**< earliest deadline first, because there is no good plan */
+    TAPER_MODE_FAILSAFE = 3, /**< the gateway is silent: failsafe limit, earliest deadline first */
+} taper_mode_t;
+
+#endif

@@ -1,0 +1,30 @@
+# How Taper's own code is compiled, and how a firmware layer becomes a library.
+
+set(CMAKE_C_STANDARD 11)
+set(CMAKE_C_STANDARD_REQUIRED ON)
+set(CMAKE_C_EXTENSIONS OFF)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+
+# Float results equal to the bit on every target need every multiplication and addition to round on its own.
+add_compile_options(-ffp-contract=off)
+
+if(TAPER_SANITIZE)
+    add_compile_options(-fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)
+    add_link_options(-fsanitize=address,undefined)
+endif()
+
+# Our own code: every warning is an error. Generated and foreign code does not link this.
+add_library(taper_strict INTERFACE)
+target_compile_options(taper_strict INTERFACE
+    -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wdouble-promotion -Wvla -Werror)
+
+# taper_layer(NAME SOURCES ... DEPENDS ...): firmware/NAME as library taper_NAME with its own include folder. A layer
+# sees the headers of what it depends on and no others, so an upward include does not compile.
+function(taper_layer name)
+    cmake_parse_arguments(LAYER "" "" "SOURCES;DEPENDS" ${ARGN})
+    add_library(taper_${name} STATIC ${LAYER_SOURCES})
+    target_include_directories(taper_${name} PUBLIC include)
+    list(TRANSFORM LAYER_DEPENDS PREPEND taper_)
+    target_link_libraries(taper_${name} PUBLIC ${LAYER_DEPENDS} PRIVATE taper_strict)
+    set_property(GLOBAL APPEND PROPERTY TAPER_CORE_LIBRARIES taper_${name})
+endfunction()
