@@ -1,0 +1,101 @@
+/**
+ * taper-sim: the firmware's sources, a fleet of simulated connectors and vehicles, and an in-memory CAN bus, in virtual
+ * time. `taper-sim --help` is the manual.
+ */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "limits_csv.h"
+#include "memory.h"
+#include "options.h"
+#include "output.h"
+#include "results.h"
+#include "sessions.h"
+#include "solver.h"
+#include "taper/stations.h"
+#include "world.h"
+
+/** A station as the options want it, and what is borrowed by it. */
+typedef struct {
+    taper_station_config_t config;
+    taper_connector_config_t *connectors;
+} station_copy_t;
+
+static station_copy_t copy_station(const sim_options_t *options) {
+    const taper_station_config_t *original = taper_stations[options->station];
+    station_copy_t copy = {.config = *original,
+                           .connectors = sim_allocate(original->connector_count, sizeof *copy.connectors)};
+    for (unsigned i = 0; i < original->connector_count; i++) {
+        copy.connectors[i] = original->connectors[i];
+        if (options->min_current_A >= 0.0) {
+            copy.connectors[i].min_mA = (int32_t)lround(options->min_current_A * 1000.0);
+        }
+    }
+    copy.config.connectors = copy.connectors;
+    copy.config.tick_ms = options->tick_s * 1000U;
+    return copy;
+}
+
+/** The site limit of the run: what was asked for, nowhere above the station's own. */
+static bool load_limits(sim_limits_t *limits, const sim_options_t *options, double station_kw) {
+    if (options->limit_file != NULL) {
+        if (!sim_limits_load(limits, options->limit_file)) {
+            return false;
+        }
+    } else {
+        sim_limits_constant(limits, options->limit_kw >= 0.0 ? options->limit_kw : station_kw);
+    }
+    if (sim_limits_cap(limits, station_kw)) {
+        fprintf(stderr, "taper-sim: note: the limit is above the station's own, %g kW, which holds\n",
+                station_kw);
+    }
+    return true;
+}
+
+/** Run and put the results out. @return the exit code of the program. */
+static int run_case(const sim_options_t *options, const sim_case_t *run) {
+    sim_results_t results;
+    sim_results_init(&results, run->sessions, options->out != NULL);
+    results.policy = run->policy->name;
+    results.station = run->station->name;
+    results.tick_s = options->tick_s;
+    results.min_current_A = options->min_current_A;
+    results.seed = run->seed;
+    int code = SIM_EXIT_INPUT;
+    if (sim_world_run(run, &results) && (options->out == NULL || sim_results_write(&results, options->out))) {
+        sim_results_print(&results, stdout);
+        code = results.violation_ticks > 0 ? SIM_EXIT_VIOLATION : SIM_EXIT_OK;
+    }
+    sim_results_free(&results);
+    return code;
+}
+
+/** With all options known: read the files and run. @return the exit code of the program. */
+static int load_and_run(const sim_options_t *options, const taper_station_config_t *station) {
+    sim_limits_t limits = {0};
+    sim_sessions_t sessions = {0};
+    int code = SIM_EXIT_INPUT;
+    if (sim_sessions_load(&sessions, options->sessions_file, station->connector_count) &&
+        load_limits(&limits, options, station->groups[0].limit_W / 1000.0) &&
+        (options->out == NULL || sim_output_check(options->out))) {
+        const sim_case_t run = {.station = station,
+                                .solver = sim_solver(options->station),
+                                .policy = options->policy,
+                                .sessions = &sessions,
+                                .limits = &limits,
+                                .seed = options->seed};
+        code = run_case(options, &run);
+    }
+    sim_sessions_free(&sessions);
+    sim_limits_free(&limits);
+    return code;
+}
+
+int main(int argc, char **argv) {
+    const sim_options_t options = sim_options_parse(argc, argv);
+    station_copy_t station = copy_station(&options);
+    const int code = load_and_run(&options, &station.config);
+    free(station.connectors);
+    return fflush(stdout) == 0 ? code : SIM_EXIT_INPUT;
+}

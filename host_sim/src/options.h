@@ -1,0 +1,38 @@
+/** The command line. */
+#ifndef SIM_OPTIONS_H
+#define SIM_OPTIONS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "baselines.h"
+#include "taper/types.h"
+
+/** Exit codes of the program. */
+enum {
+    SIM_EXIT_OK = 0,
+    SIM_EXIT_INPUT = 1,     /**< a file that cannot be read or written, or says something wrong */
+    SIM_EXIT_USAGE = 2,     /**< a command line that makes no sense */
+    SIM_EXIT_VIOLATION = 3, /**< the run went through, but a limit was exceeded */
+};
+
+/** Strings are borrowed from the command line. */
+typedef struct {
+    const char *sessions_file;
+    const char *limit_file; /**< NULL: none */
+    const char *out;        /**< NULL: no files */
+    const sim_policy_t *policy;
+    unsigned station;     /**< index in taper_stations[] */
+    double limit_kw;      /**< negative: not given */
+    double min_current_A; /**< negative: the station's own */
+    uint32_t tick_s;
+    uint64_t seed;
+} sim_options_t;
+
+/** Read the command line. Prints and ends the program on --help (0) and on what it does not understand (2). */
+sim_options_t sim_options_parse(int argc, char **argv);
+
+/** The least of the connectors' maximum currents [A]. */
+double sim_least_maximum_A(const taper_station_config_t *station);
+
+#endif

@@ -1,0 +1,236 @@
+#define _POSIX_C_SOURCE 200809L
+
+#include "results.h"
+
+#include <cjson/cJSON.h>
+#include <csv.h>
+#include <inttypes.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "memory.h"
+#include "output.h"
+
+/** A session that leaves with this much less than its target is satisfied still. */
+#define SOC_TOLERANCE 0.01
+/** What rounding of sums of doubles may leave at that edge. */
+#define SOC_HAIR 1e-9
+
+/** Totals over all sessions. */
+typedef struct {
+    double requested_kwh, delivered_kwh;
+    size_t satisfied, queued, never_plugged_in;
+} totals_t;
+
+static void open_text(sim_text_t *text) {
+    text->stream = open_memstream(&text->text, &text->size);
+    if (text->stream == NULL) {
+        fputs("taper-sim: out of memory\n", stderr);
+        exit(EXIT_FAILURE);
+    }
+}
+
+static void free_text(sim_text_t *text) {
+    if (text->stream != NULL) {
+        fclose(text->stream);
+        free(text->text);
+    }
+    *text = (sim_text_t){0};
+}
+
+void sim_results_init(sim_results_t *results, const sim_sessions_t *sessions, bool records) {
+    *results = (sim_results_t){.sessions = sessions, .min_current_A = -1.0};
+    results->outcome = sim_allocate(sessions->count, sizeof *results->outcome);
+    if (records) {
+        open_text(&results->steps);
+        open_text(&results->connectors);
+        fputs("time_s,limit_kw,power_kw,active,mode\n", results->steps.stream);
+        fputs("time_s,connector,session_id,setpoint_a,current_a,soc\n", results->connectors.stream);
+    }
+}
+
+void sim_results_free(sim_results_t *results) {
+    free(results->outcome);
+    free_text(&results->steps);
+    free_text(&results->connectors);
+    sim_samples_free(&results->iterations);
+    sim_samples_free(&results->solve_ms);
+    *results = (sim_results_t){0};
+}
+
+static const char *mode_name(taper_mode_t mode) {
+    switch (mode) {
+    case TAPER_MODE_INIT: return "init";
+    case TAPER_MODE_PLAN: return "plan";
+    case TAPER_MODE_FALLBACK: return "fallback";
+    case TAPER_MODE_FAILSAFE: return "failsafe";
+    default: return "unknown";
+    }
+}
+
+void sim_results_step(sim_results_t *results, int64_t time_s, double limit_kw, double power_kw,
+                      unsigned active, taper_mode_t mode) {
+    results->peak_kw = fmax(results->peak_kw, power_kw);
+    if (results->steps.stream != NULL) {
+        fprintf(results->steps.stream, "%" PRId64 ",%.4f,%.4f,%u,%s\n", time_s, limit_kw, power_kw, active,
+                mode_name(mode));
+    }
+}
+
+/** Write a text as a CSV field, quoted only if it has to be. */
+static void put_field(FILE *stream, const char *text) {
+    if (strpbrk(text, ",\"\r\n") == NULL) {
+        fputs(text, stream);
+    } else {
+        csv_fwrite(stream, text, strlen(text));
+    }
+}
+
+void sim_results_connector(sim_results_t *results, int64_t time_s, unsigned connector,
+                           const sim_evse_t *evse) {
+    FILE *stream = results->connectors.stream;
+    if (stream == NULL) {
+        return;
+    }
+    fprintf(stream, "%" PRId64 ",%u,", time_s, connector + 1);
+    put_field(stream, evse->vehicle->id);
+    fprintf(stream, ",%.3f,%.3f,%.5f\n", evse->setpoint_A, evse->current_A, sim_evse_soc(evse));
+}
+
+static double soc_departure(const sim_session_t *session, const sim_outcome_t *outcome) {
+    return session->soc_arrival + outcome->energy_kwh / session->battery_kwh;
+}
+
+static bool satisfied(const sim_session_t *session, const sim_outcome_t *outcome) {
+    return soc_departure(session, outcome) >= session->soc_target - SOC_TOLERANCE - SOC_HAIR;
+}
+
+static totals_t sum_up(const sim_results_t *results) {
+    totals_t totals = {0};
+    for (size_t i = 0; i < results->sessions->count; i++) {
+        const sim_session_t *session = &results->sessions->session[i];
+        const sim_outcome_t *outcome = &results->outcome[i];
+        totals.requested_kwh += sim_session_request_kwh(session);
+        totals.delivered_kwh += outcome->energy_kwh;
+        totals.satisfied += satisfied(session, outcome) ? 1 : 0;
+        totals.queued += outcome->queued_s > 0.0 ? 1 : 0;
+        totals.never_plugged_in += outcome->connector == 0 ? 1 : 0;
+    }
+    return totals;
+}
+
+/** The text of sessions.csv. */
+static void put_sessions(const sim_results_t *results, FILE *stream) {
+    fputs("session_id,connector,energy_kwh,soc_departure,satisfied,short_kwh,queued_s\n", stream);
+    for (size_t i = 0; i < results->sessions->count; i++) {
+        const sim_session_t *session = &results->sessions->session[i];
+        const sim_outcome_t *outcome = &results->outcome[i];
+        put_field(stream, session->id);
+        if (outcome->connector != 0) {
+            fprintf(stream, ",%u", outcome->connector);
+        } else {
+            fputc(',', stream);
+        }
+        const double short_kwh = fmax(sim_session_request_kwh(session) - outcome->energy_kwh, 0.0);
+        fprintf(stream, ",%.4f,%.5f,%d,%.4f,%.3f\n", outcome->energy_kwh, soc_departure(session, outcome),
+                satisfied(session, outcome) ? 1 : 0, short_kwh, outcome->queued_s);
+    }
+}
+
+/** Add a number with a fixed count of decimals. */
+static void add_fixed(cJSON *object, const char *name, double value, int decimals) {
+    char text[64];
+    snprintf(text, sizeof text, "%.*f", decimals, value);
+    cJSON_AddRawToObject(object, name, text);
+}
+
+static void add_count(cJSON *object, const char *name, uint64_t value) {
+    char text[32];
+    snprintf(text, sizeof text, "%" PRIu64, value);
+    cJSON_AddRawToObject(object, name, text);
+}
+
+static void add_spread(cJSON *object, const char *name, sim_samples_t *samples, int decimals) {
+    const sim_spread_t spread = sim_samples_spread(samples);
+    cJSON *inner = cJSON_AddObjectToObject(object, name);
+    add_fixed(inner, "p50", spread.p50, decimals);
+    add_fixed(inner, "p99", spread.p99, decimals);
+    add_fixed(inner, "max", spread.max, decimals);
+}
+
+/** The text of summary.json; NULL without memory. To be freed with cJSON_free(). */
+static char *summary_json(sim_results_t *results) {
+    const totals_t totals = sum_up(results);
+    cJSON *object = cJSON_CreateObject();
+    cJSON_AddStringToObject(object, "policy", results->policy);
+    cJSON_AddStringToObject(object, "station", results->station);
+    add_count(object, "sessions", results->sessions->count);
+    add_fixed(object, "requested_kwh", totals.requested_kwh, 4);
+    add_fixed(object, "delivered_kwh", totals.delivered_kwh, 4);
+    add_count(object, "satisfied", totals.satisfied);
+    add_count(object, "limit_violations", results->violation_ticks);
+    add_count(object, "fallback_ticks", results->fallback_ticks);
+    add_count(object, "solves", results->solves);
+    add_spread(object, "iterations", &results->iterations, 0);
+    add_spread(object, "solve_ms", &results->solve_ms, 3);
+    add_fixed(object, "peak_kw", results->peak_kw, 4);
+    add_count(object, "tick_s", (uint64_t)results->tick_s);
+    if (results->min_current_A >= 0.0) {
+        add_fixed(object, "min_current_a", results->min_current_A, 3);
+    } else {
+        cJSON_AddNullToObject(object, "min_current_a");
+    }
+    add_count(object, "seed", results->seed);
+    add_count(object, "queued", totals.queued);
+    add_count(object, "never_plugged_in", totals.never_plugged_in);
+    add_count(object, "guard_violations", results->guard_violations);
+    char *text = cJSON_Print(object);
+    cJSON_Delete(object);
+    return text;
+}
+
+bool sim_results_write(sim_results_t *results, const char *directory) {
+    sim_text_t sessions = {0};
+    open_text(&sessions);
+    put_sessions(results, sessions.stream);
+    char *summary = summary_json(results);
+    // After a flush the text and size of a memory stream are up to date; a failed one means that memory ran out.
+    const bool good = summary != NULL && fflush(sessions.stream) == 0 && fflush(results->steps.stream) == 0 &&
+                      fflush(results->connectors.stream) == 0;
+    bool written = false;
+    if (good) {
+        const sim_output_t files[] = {{"sessions.csv", sessions.text, sessions.size},
+                                      {"steps.csv", results->steps.text, results->steps.size},
+                                      {"connectors.csv", results->connectors.text, results->connectors.size},
+                                      {"summary.json", summary, strlen(summary)}};
+        written = sim_output_write(directory, files, sizeof files / sizeof files[0]);
+    } else {
+        fputs("taper-sim: out of memory\n", stderr);
+    }
+    cJSON_free(summary);
+    free_text(&sessions);
+    return written;
+}
+
+void sim_results_print(sim_results_t *results, FILE *stream) {
+    const totals_t totals = sum_up(results);
+    const double share =
+        totals.requested_kwh > 0.0 ? 100.0 * totals.delivered_kwh / totals.requested_kwh : 100.0;
+    fprintf(stream,
+            "%s, station %s: %.1f of %.1f kWh (%.2f %%), %zu of %zu sessions satisfied, peak %.1f kW\n",
+            results->policy, results->station, totals.delivered_kwh, totals.requested_kwh, share,
+            totals.satisfied, results->sessions->count, results->peak_kw);
+    fprintf(stream,
+            "%zu queued, %zu never plugged in; %" PRIu32 " fallback ticks, %" PRIu32 " limit violations\n",
+            totals.queued, totals.never_plugged_in, results->fallback_ticks, results->violation_ticks);
+    if (results->solves > 0) {
+        const sim_spread_t iterations = sim_samples_spread(&results->iterations);
+        const sim_spread_t solve_ms = sim_samples_spread(&results->solve_ms);
+        fprintf(stream,
+                "%" PRIu32
+                " solves: %.0f iterations (p99 %.0f, max %.0f), %.2f ms (p99 %.2f, max %.2f) in the median\n",
+                results->solves, iterations.p50, iterations.p99, iterations.max, solve_ms.p50, solve_ms.p99,
+                solve_ms.max);
+    }
+}

@@ -1,0 +1,207 @@
+#include "sessions.h"
+
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "csv_table.h"
+#include "memory.h"
+
+enum {
+    COLUMN_ID,
+    COLUMN_CONNECTOR,
+    COLUMN_ARRIVAL,
+    COLUMN_DEPARTURE,
+    COLUMN_BATTERY,
+    COLUMN_SOC_ARRIVAL,
+    COLUMN_SOC_TARGET,
+    COLUMN_MAX_POWER,
+    COLUMN_TAPER,
+    COLUMN_TOLD,
+    COLUMN_COUNT
+};
+
+static const sim_column_t columns[COLUMN_COUNT] = {
+    [COLUMN_ID] = {"session_id", true},         [COLUMN_CONNECTOR] = {"connector", true},
+    [COLUMN_ARRIVAL] = {"arrival_s", true},     [COLUMN_DEPARTURE] = {"departure_s", true},
+    [COLUMN_BATTERY] = {"battery_kwh", true},   [COLUMN_SOC_ARRIVAL] = {"soc_arrival", true},
+    [COLUMN_SOC_TARGET] = {"soc_target", true}, [COLUMN_MAX_POWER] = {"max_kw", true},
+    [COLUMN_TAPER] = {"taper_kw", true},        [COLUMN_TOLD] = {"expected_departure_s", false},
+};
+
+/** Times are carried in TIME_SYNC as 32-bit seconds; a time from 1970 on fits. */
+#define LATEST_S 4294967295.0
+/** The bus counts a session's energy in 16 bits of 10 Wh, and a vehicle's power in 16 bits of 10 W. */
+#define MOST_ON_THE_BUS 655.34
+
+/** The row being read. */
+typedef struct {
+    const sim_table_t *table;
+    size_t row;
+    size_t index[COLUMN_COUNT];
+    unsigned connectors;
+} row_t;
+
+static bool read_range(const row_t *row, int column, double low, double high, double *value) {
+    if (!sim_table_number(row->table, row->row, row->index[column], value)) {
+        return false;
+    }
+    if (*value < low || *value > high) {
+        return sim_table_error(row->table, row->row, row->index[column], "%s is outside %.10g..%.10g",
+                               sim_table_cell(row->table, row->row, row->index[column]), low, high);
+    }
+    return true;
+}
+
+static bool read_positive(const row_t *row, int column, double high, double *value) {
+    if (!sim_table_number(row->table, row->row, row->index[column], value)) {
+        return false;
+    }
+    if (*value <= 0.0) {
+        return sim_table_error(row->table, row->row, row->index[column], "must be above 0");
+    }
+    if (*value > high) {
+        return sim_table_error(row->table, row->row, row->index[column],
+                               "must not be above %.10g, the most that the bus carries", high);
+    }
+    return true;
+}
+
+static bool read_connector(const row_t *row, unsigned *connector) {
+    const size_t column = row->index[COLUMN_CONNECTOR];
+    const char *cell = sim_table_cell(row->table, row->row, column);
+    *connector = 0;
+    if (cell[0] == '\0') {
+        return true;
+    }
+    // Six digits cannot overflow, and no station has as many connectors.
+    if (strspn(cell, "0123456789") != strlen(cell) || strlen(cell) > 6) {
+        return sim_table_error(row->table, row->row, column, "unknown connector '%s', the station has 1..%u",
+                               cell, row->connectors);
+    }
+    *connector = (unsigned)strtoul(cell, NULL, 10);
+    if (*connector < 1 || *connector > row->connectors) {
+        return sim_table_error(row->table, row->row, column, "unknown connector %s, the station has 1..%u",
+                               cell, row->connectors);
+    }
+    return true;
+}
+
+static bool read_times(const row_t *row, sim_session_t *session) {
+    if (!read_range(row, COLUMN_ARRIVAL, 0.0, LATEST_S, &session->arrival_s) ||
+        !read_range(row, COLUMN_DEPARTURE, 0.0, LATEST_S, &session->departure_s)) {
+        return false;
+    }
+    if (session->departure_s <= session->arrival_s) {
+        return sim_table_error(row->table, row->row, row->index[COLUMN_DEPARTURE], "not after arrival_s");
+    }
+    session->told_s = session->departure_s;
+    const size_t told = row->index[COLUMN_TOLD];
+    if (told == SIM_NO_COLUMN || sim_table_cell(row->table, row->row, told)[0] == '\0') {
+        return true;
+    }
+    if (!read_range(row, COLUMN_TOLD, 0.0, LATEST_S, &session->told_s)) {
+        return false;
+    }
+    return session->told_s >= session->arrival_s ||
+           sim_table_error(row->table, row->row, told, "before arrival_s");
+}
+
+static bool read_vehicle(const row_t *row, sim_session_t *session) {
+    if (!read_positive(row, COLUMN_BATTERY, MOST_ON_THE_BUS, &session->battery_kwh) ||
+        !read_range(row, COLUMN_SOC_ARRIVAL, 0.0, 1.0, &session->soc_arrival) ||
+        !read_range(row, COLUMN_SOC_TARGET, 0.0, 1.0, &session->soc_target)) {
+        return false;
+    }
+    if (session->soc_target < session->soc_arrival) {
+        return sim_table_error(row->table, row->row, row->index[COLUMN_SOC_TARGET], "below soc_arrival");
+    }
+    if (!read_positive(row, COLUMN_MAX_POWER, MOST_ON_THE_BUS, &session->max_kw) ||
+        !sim_table_number(row->table, row->row, row->index[COLUMN_TAPER], &session->taper_kw)) {
+        return false;
+    }
+    if (session->taper_kw < 0.0) {
+        return sim_table_error(row->table, row->row, row->index[COLUMN_TAPER], "below 0");
+    }
+    return session->taper_kw <= session->max_kw ||
+           sim_table_error(row->table, row->row, row->index[COLUMN_TAPER], "above max_kw");
+}
+
+static bool read_session(const row_t *row, sim_session_t *session) {
+    const char *id = sim_table_cell(row->table, row->row, row->index[COLUMN_ID]);
+    if (id[0] == '\0') {
+        return sim_table_error(row->table, row->row, row->index[COLUMN_ID], "empty");
+    }
+    if (!read_connector(row, &session->connector) || !read_times(row, session) ||
+        !read_vehicle(row, session)) {
+        return false;
+    }
+    session->id = sim_copy(id);
+    return true;
+}
+
+static int compare_id(const void *a, const void *b) {
+    const sim_session_t *const *left = a;
+    const sim_session_t *const *right = b;
+    const int order = strcmp((*left)->id, (*right)->id);
+    if (order != 0) {
+        return order;
+    }
+    return (*left > *right) - (*left < *right);
+}
+
+/** No two sessions have the same id; else the first row that repeats one is reported. */
+static bool ids_differ(const row_t *row, const sim_sessions_t *sessions) {
+    const sim_session_t **sorted = sim_allocate(sessions->count, sizeof *sorted);
+    for (size_t i = 0; i < sessions->count; i++) {
+        sorted[i] = &sessions->session[i];
+    }
+    qsort(sorted, sessions->count, sizeof *sorted, compare_id);
+    size_t repeats = SIZE_MAX;
+    for (size_t i = 1; i < sessions->count; i++) {
+        const size_t place = (size_t)(sorted[i] - sessions->session);
+        if (strcmp(sorted[i - 1]->id, sorted[i]->id) == 0 && place < repeats) {
+            repeats = place;
+        }
+    }
+    free(sorted);
+    return repeats == SIZE_MAX || sim_table_error(row->table, repeats, row->index[COLUMN_ID],
+                                                  "'%s' was given before", sessions->session[repeats].id);
+}
+
+static bool read_rows(row_t *row, sim_sessions_t *sessions) {
+    sessions->session = sim_allocate(row->table->rows, sizeof *sessions->session);
+    for (row->row = 0; row->row < row->table->rows; row->row++) {
+        if (!read_session(row, &sessions->session[row->row])) {
+            return false;
+        }
+        sessions->count++;
+    }
+    return ids_differ(row, sessions);
+}
+
+bool sim_sessions_load(sim_sessions_t *sessions, const char *file, unsigned connectors) {
+    *sessions = (sim_sessions_t){0};
+    sim_table_t table;
+    if (!sim_table_read(&table, file)) {
+        return false;
+    }
+    row_t row = {.table = &table, .connectors = connectors};
+    const bool good =
+        sim_table_columns(&table, columns, COLUMN_COUNT, row.index) && read_rows(&row, sessions);
+    if (good) {
+        sim_table_warn_unknown(&table, columns, COLUMN_COUNT);
+    } else {
+        sim_sessions_free(sessions);
+    }
+    sim_table_free(&table);
+    return good;
+}
+
+void sim_sessions_free(sim_sessions_t *sessions) {
+    for (size_t i = 0; i < sessions->count; i++) {
+        free(sessions->session[i].id);
+    }
+    free(sessions->session);
+    *sessions = (sim_sessions_t){0};
+}

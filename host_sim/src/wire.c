@@ -1,0 +1,14 @@
+#include "wire.h"
+
+#include "taper/codec.h"
+#include "taper/e2e.h"
+
+bool sim_wire_send(taper_membus_t *bus, const taper_message_t *message, uint8_t *counter) {
+    taper_frame_t frame;
+    if (!taper_encode(message, &frame)) {
+        return false;
+    }
+    taper_e2e_protect(&frame, *counter);
+    *counter = (uint8_t)((*counter + 1) % 16);
+    return taper_membus_world_send(bus, &frame);
+}

@@ -1,0 +1,204 @@
+#include "world.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "fleet.h"
+#include "gateway.h"
+#include "memory.h"
+#include "progress.h"
+#include "queue.h"
+
+/** Power above a limit by less than this is rounding of doubles [kW]. */
+#define LIMIT_TOLERANCE_KW 1e-6
+/** A tick of this length or more has room for a whole solve; shorter ones work in slices. */
+#define LONG_TICK_S      10
+#define SLICE_ITERATIONS 50
+#define SOLVE_ITERATIONS TAPER_MAX_ITERATIONS
+
+typedef struct {
+    const sim_case_t *run;
+    sim_results_t *results;
+    int64_t tick_s;
+    taper_membus_t bus;
+    taper_port_t port;
+    uint32_t tick_ms; /**< context of the policy */
+    taper_policy_t policy;
+    taper_station_t station;
+    sim_fleet_t fleet;
+    sim_gateway_t gateway;
+    sim_queue_t queue;
+    uint64_t random; /**< state of next_random() */
+    uint8_t
+        turn[TAPER_MAX_CONNECTORS + 1]; /**< the order in which nodes send; the last number is the gateway */
+    double group_kw[TAPER_MAX_GROUPS];
+    uint32_t plans; /**< of the station, seen so far */
+} world_t;
+
+/** The splitmix64 generator. */
+static uint64_t next_random(world_t *world) {
+    world->random += UINT64_C(0x9E3779B97F4A7C15);
+    uint64_t z = world->random;
+    z = (z ^ (z >> 30)) * UINT64_C(0xBF58476D1CE4E5B9);
+    z = (z ^ (z >> 27)) * UINT64_C(0x94D049BB133111EB);
+    return z ^ (z >> 31);
+}
+
+static uint32_t clock_us(void *context) {
+    (void)context;
+    return (uint32_t)sim_now_us();
+}
+
+/** @return whether the station takes its description and options. */
+static bool init_station(world_t *world) {
+    const sim_case_t *run = world->run;
+    world->port = taper_membus_station_port(&world->bus);
+    world->port.clock_us = clock_us;
+    world->tick_ms = run->station->tick_ms;
+    world->policy = (taper_policy_t){.propose = run->policy->propose, .context = &world->tick_ms};
+    const bool plans = run->policy->propose == NULL;
+    const taper_station_options_t options = {
+        .config = run->station,
+        .port = &world->port,
+        .solver = plans ? run->solver : NULL,
+        .policy = plans ? NULL : &world->policy,
+        .iterations_per_tick = world->tick_s >= LONG_TICK_S ? SOLVE_ITERATIONS : SLICE_ITERATIONS,
+    };
+    return taper_station_init(&world->station, &options) == TAPER_OK;
+}
+
+/** Every node sends what it has to say, in an order that the seed decides anew for each tick. */
+static bool send_reports(world_t *world, int64_t now_s) {
+    const unsigned connectors = world->run->station->connector_count;
+    bool sent = true;
+    for (unsigned left = connectors + 1; left > 0; left--) {
+        const unsigned pick = (unsigned)(next_random(world) % left);
+        const uint8_t node = world->turn[pick];
+        world->turn[pick] = world->turn[left - 1];
+        world->turn[left - 1] = node;
+        const bool ok = node == connectors ? sim_gateway_report(&world->gateway, now_s)
+                                           : sim_fleet_report(&world->fleet, node);
+        sent = sent && ok;
+    }
+    return sent;
+}
+
+/** Whether some limit is exceeded: that of the site in this tick, or that of a group of the feeder tree. */
+static bool is_violated(world_t *world, double limit_kw, double *site_kw) {
+    const taper_station_config_t *station = world->run->station;
+    double *group_kw = world->group_kw;
+    for (unsigned g = 0; g < station->group_count; g++) {
+        group_kw[g] = 0.0;
+    }
+    for (unsigned i = 0; i < station->connector_count; i++) {
+        group_kw[station->connectors[i].group] += world->fleet.evse[i].power_kw;
+    }
+    bool violated = false;
+    for (unsigned g = station->group_count; g-- > 0;) { // a parent stands before its children
+        const double own_kw = (double)station->groups[g].limit_W / 1000.0;
+        violated = violated || group_kw[g] > own_kw + LIMIT_TOLERANCE_KW;
+        if (g > 0) {
+            group_kw[station->groups[g].parent] += group_kw[g];
+        }
+    }
+    *site_kw = group_kw[0];
+    return violated || *site_kw > limit_kw + LIMIT_TOLERANCE_KW;
+}
+
+/** The vehicles take what they may, and it is all written down. */
+static void draw_power(world_t *world, int64_t now_s) {
+    sim_results_t *results = world->results;
+    unsigned active = 0;
+    for (unsigned i = 0; i < world->run->station->connector_count; i++) {
+        const sim_evse_t *evse = &world->fleet.evse[i];
+        sim_fleet_draw(&world->fleet, i, (double)now_s);
+        if (evse->vehicle != NULL) {
+            active += sim_evse_wants(evse) ? 1 : 0;
+            sim_results_connector(results, now_s, i, evse);
+        }
+    }
+    const double limit_kw = sim_gateway_limit_kw(&world->gateway, now_s);
+    double site_kw = 0.0;
+    results->violation_ticks += is_violated(world, limit_kw, &site_kw) ? 1 : 0;
+    sim_results_step(results, now_s, limit_kw, site_kw, active, taper_station_mode(&world->station));
+    for (unsigned i = 0; i < world->run->station->connector_count; i++) {
+        sim_fleet_charge(&world->fleet, i, (double)now_s);
+    }
+}
+
+/** Take note of a solve that the station finished in this tick. */
+static void note_solve(world_t *world) {
+    const taper_station_t *station = &world->station;
+    if (station->counters.plans == world->plans) {
+        return;
+    }
+    world->plans = station->counters.plans;
+    sim_samples_add(&world->results->iterations, taper_planner_iterations(&station->planner));
+    sim_samples_add(&world->results->solve_ms, station->last_solve_us / 1000.0);
+}
+
+static bool run_tick(world_t *world, int64_t now_s) {
+    sim_queue_advance(&world->queue, now_s);
+    if (!sim_gateway_publish(&world->gateway, &world->station, now_s) || !send_reports(world, now_s)) {
+        fprintf(stderr,
+                "taper-sim: internal error at %lld s: the station or the bus refused what it was sent\n",
+                (long long)now_s);
+        return false;
+    }
+    taper_station_step(&world->station, (uint32_t)((uint64_t)now_s * 1000U));
+    note_solve(world);
+    sim_fleet_listen(&world->fleet);
+    draw_power(world, now_s);
+    return true;
+}
+
+static bool run_ticks(world_t *world) {
+    const sim_sessions_t *sessions = world->run->sessions;
+    double first_s = INFINITY;
+    double end_s = 0.0;
+    for (size_t i = 0; i < sessions->count; i++) {
+        first_s = fmin(first_s, sessions->session[i].arrival_s);
+        end_s = fmax(end_s, sessions->session[i].departure_s);
+    }
+    const int64_t start_s = sessions->count == 0 ? 0 : (int64_t)first_s / world->tick_s * world->tick_s;
+    const int64_t duration_s = (int64_t)ceil(end_s) - start_s;
+    sim_progress_t progress;
+    sim_progress_init(&progress);
+    bool good = true;
+    for (int64_t now_s = start_s; good && (double)now_s < end_s; now_s += world->tick_s) {
+        sim_progress_show(&progress, now_s - start_s, duration_s);
+        good = run_tick(world, now_s);
+    }
+    sim_progress_end(&progress);
+    return good;
+}
+
+bool sim_world_run(const sim_case_t *run, sim_results_t *results) {
+    world_t *world = sim_allocate(1, sizeof *world);
+    world->run = run;
+    world->results = results;
+    world->tick_s = run->station->tick_ms / 1000;
+    world->random = run->seed;
+    for (unsigned i = 0; i <= run->station->connector_count; i++) {
+        world->turn[i] = (uint8_t)i;
+    }
+    taper_membus_init(&world->bus);
+    sim_fleet_init(&world->fleet, run->station, &world->bus, run->policy->tells_taper, run->seed);
+    sim_gateway_init(&world->gateway, run->limits, &world->bus, world->tick_s, run->seed);
+    sim_queue_init(&world->queue, run->sessions, &world->fleet, results->outcome);
+    bool good = init_station(world);
+    if (good) {
+        good = run_ticks(world);
+    } else {
+        fprintf(stderr, "taper-sim: the firmware refuses station %s with these options\n",
+                run->station->name);
+    }
+    sim_queue_finish(&world->queue);
+    results->solves = world->station.counters.plans;
+    results->fallback_ticks = world->station.counters.fallback_ticks;
+    results->guard_violations = world->station.counters.guard_violations;
+    sim_queue_free(&world->queue);
+    free(world);
+    return good;
+}

@@ -1,0 +1,30 @@
+/** One run: the station, its field and the gateway on one bus, tick after tick in virtual time. */
+#ifndef SIM_WORLD_H
+#define SIM_WORLD_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "baselines.h"
+#include "limits_csv.h"
+#include "results.h"
+#include "sessions.h"
+#include "taper/station.h"
+
+/** What to run. Everything is borrowed. */
+typedef struct {
+    const taper_station_config_t *station; /**< its tick is a whole number of seconds */
+    const taper_solver_t *solver;          /**< NULL: none was built in */
+    const sim_policy_t *policy;
+    const sim_sessions_t *sessions;
+    const sim_limits_t *limits; /**< nowhere above the station's own site limit */
+    uint64_t seed;              /**< decides in which order nodes send, and nothing else */
+} sim_case_t;
+
+/**
+ * Run from the tick of the first arrival to the last departure, and add what happened to `results`.
+ * @return false, after one line on stderr, if the simulation itself broke.
+ */
+bool sim_world_run(const sim_case_t *run, sim_results_t *results);
+
+#endif
