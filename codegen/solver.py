@@ -17,12 +17,11 @@ from workspace import Array, OsqpChanged, Real, Struct
 SETTINGS: dict[str, float | int] = {
     "scaling": 0,  # qp.py scales the rows; scaling in OSQP would be redone with every update of the matrices
     "rho": 0.3,
-    "eps_abs": 1e-3,
-    "eps_rel": 1e-3,
+    "eps_abs": 3e-4,
+    "eps_rel": 3e-4,
     "max_iter": 500,
     "check_termination": 10,
-    "adaptive_rho": 1,  # by iterations: by time, runs would not repeat
-    "adaptive_rho_interval": 50,
+    "adaptive_rho": 0,  # the planner does it, so that a solve in slices takes the same steps as one in one piece
     "polishing": 0,
     "warm_starting": 1,
     "verbose": 0,

@@ -21,8 +21,8 @@ import numpy as np
 Real = Literal["double", "float"]
 
 # Index arrays that no function of embedded mode 2 writes, checked in the sources of OSQP 1.1 and QDLDL 0.1.8:
-#   data_P_csc_p/_i,    csc_update_values(), csc_scale(), csc_*mult_diag() write the values x only; all that change p
-#   data_A_csc_p/_i     or i (csc_utils.c) are compiled out by OSQP_EMBEDDED_MODE
+#   data_P_csc_p/_i,    csc_update_values(), csc_scale(), csc_*mult_diag() write the values x only; what changes p or i
+#   data_A_csc_p/_i     (csc_utils.c) is compiled out by OSQP_EMBEDDED_MODE, or is csc_cumsum(), which nothing calls
 #   linsys_KKT_p/_i     update_KKT_P/_A/_param2() write KKT->x only; QDLDL_factor() takes them as const
 #   linsys_PtoKKT, _AtoKKT, _rhotoKKT   read by update_KKT_*()
 #   linsys_P            the permutation, read by LDLSolve()

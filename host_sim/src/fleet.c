@@ -26,7 +26,7 @@ void sim_fleet_init(sim_fleet_t *fleet, const taper_station_config_t *station, t
         evse->config = &station->connectors[i];
         fleet->at[evse->config->bus][evse->config->node] = (uint8_t)(i + 1);
         for (unsigned k = 0; k < TAPER_FRAMES_PER_CONNECTOR; k++) {
-            evse->counter[k] = (uint8_t)((seed + 7U * i + 3U * k) % 16U);
+            evse->counter[k] = (uint8_t)((seed % 16U + 7U * i + 3U * k) % 16U);
         }
     }
 }

@@ -35,7 +35,17 @@ static const char description[] =
     "\n"
     "EXIT CODE: 0 good, 1 bad input, 2 bad command line, 3 a limit was exceeded.\n";
 
-enum { KEY_SESSIONS = 256, KEY_POLICY, KEY_STATION, KEY_LIMIT, KEY_LIMIT_CSV, KEY_TICK, KEY_MINIMUM, KEY_SEED, KEY_OUT };
+enum {
+    KEY_SESSIONS = 256,
+    KEY_POLICY,
+    KEY_STATION,
+    KEY_LIMIT,
+    KEY_LIMIT_CSV,
+    KEY_TICK,
+    KEY_MINIMUM,
+    KEY_SEED,
+    KEY_OUT
+};
 
 static const struct argp_option options[] = {
     {"sessions", KEY_SESSIONS, "FILE", 0, "Charging sessions to replay (CSV, see below)", 0},
@@ -93,7 +103,7 @@ static char *add_names(int key, const char *text, void *input) {
         longer = NULL;
     }
     free(names);
-    return longer != NULL ? longer : (char *)(uintptr_t)text;
+    return longer != NULL ? longer : (char *)text;
 }
 
 static void set_policy(sim_options_t *chosen, const char *name, struct argp_state *state) {

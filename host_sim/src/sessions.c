@@ -140,31 +140,33 @@ static bool read_session(const row_t *row, sim_session_t *session) {
     return true;
 }
 
-static int compare_id(const void *a, const void *b) {
-    const sim_session_t *const *left = a;
-    const sim_session_t *const *right = b;
-    const int order = strcmp((*left)->id, (*right)->id);
-    if (order != 0) {
-        return order;
-    }
-    return (*left > *right) - (*left < *right);
+/** A session's id and its place in the file. */
+typedef struct {
+    const char *id;
+    size_t row;
+} name_t;
+
+static int compare_name(const void *a, const void *b) {
+    const name_t *left = a;
+    const name_t *right = b;
+    const int order = strcmp(left->id, right->id);
+    return order != 0 ? order : (left->row > right->row) - (left->row < right->row);
 }
 
 /** No two sessions have the same id; else the first row that repeats one is reported. */
 static bool ids_differ(const row_t *row, const sim_sessions_t *sessions) {
-    const sim_session_t **sorted = sim_allocate(sessions->count, sizeof *sorted);
+    name_t *names = sim_allocate(sessions->count, sizeof *names);
     for (size_t i = 0; i < sessions->count; i++) {
-        sorted[i] = &sessions->session[i];
+        names[i] = (name_t){.id = sessions->session[i].id, .row = i};
     }
-    qsort(sorted, sessions->count, sizeof *sorted, compare_id);
+    qsort(names, sessions->count, sizeof *names, compare_name);
     size_t repeats = SIZE_MAX;
     for (size_t i = 1; i < sessions->count; i++) {
-        const size_t place = (size_t)(sorted[i] - sessions->session);
-        if (strcmp(sorted[i - 1]->id, sorted[i]->id) == 0 && place < repeats) {
-            repeats = place;
+        if (names[i].row < repeats && strcmp(names[i - 1].id, names[i].id) == 0) {
+            repeats = names[i].row;
         }
     }
-    free(sorted);
+    free(names);
     return repeats == SIZE_MAX || sim_table_error(row->table, repeats, row->index[COLUMN_ID],
                                                   "'%s' was given before", sessions->session[repeats].id);
 }

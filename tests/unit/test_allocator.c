@@ -172,7 +172,8 @@ static void make_hostile(taper_proposal_t *proposal, uint32_t *state) {
     for (uint8_t i = 0; i < 4; i++) {
         proposal->wish_W[i] = hostile(state);
         proposal->ceiling_W[i] = hostile(state);
-        proposal->rank[i] = (uint8_t)(scene_random(state) % 6); /* not a permutation, partly not a connector */
+        proposal->rank[i] =
+            (uint8_t)(scene_random(state) % 6); /* not a permutation, partly not a connector */
     }
 }
 
@@ -218,7 +219,8 @@ static void test_limits_hold_under_a_hundred_thousand_hostile_proposals(void) {
         TEST_ASSERT_TRUE(taper_guard_passes(scene_four(), &snapshot, site_limit_W, &setpoints));
         with_current += power_mW(&snapshot, 0, 3) > 0 ? 1 : 0;
     }
-    TEST_ASSERT_GREATER_THAN_UINT32(30000, with_current); /* an allocator that gives nothing is not safe, it is off */
+    TEST_ASSERT_GREATER_THAN_UINT32(
+        30000, with_current); /* an allocator that gives nothing is not safe, it is off */
 }
 
 static void test_the_guard_refuses_every_kind_of_excess(void) {

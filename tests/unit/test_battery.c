@@ -42,7 +42,8 @@ static void test_useful_power_is_bounded_by_connector_taper_and_need(void) {
     demand = tapered(30000);
     TEST_ASSERT_EQUAL_INT32(4360, taper_battery_useful_W(&demand, 1000));
     demand.need_Wh = 500;
-    TEST_ASSERT_EQUAL_INT32(2000, taper_battery_useful_W(&demand, 900000)); /* 500 Wh in a quarter of an hour */
+    TEST_ASSERT_EQUAL_INT32(2000,
+                            taper_battery_useful_W(&demand, 900000)); /* 500 Wh in a quarter of an hour */
 }
 
 static void test_nothing_is_useful_for_an_inactive_demand(void) {

@@ -7,6 +7,7 @@ typedef struct {
     const taper_station_config_t *config;
     const taper_snapshot_t *snapshot;
     const taper_proposal_t *proposal;
+    const taper_allocator_t *allocator; /* the switches' history */
     int64_t room_mW[TAPER_MAX_GROUPS]; /* never negative */
     int32_t *current_mA;
 } round_t;
@@ -66,9 +67,10 @@ static void raise(round_t *round, uint8_t i, int32_t target_mA) {
 }
 
 /** A switch that belongs to another session has no history. */
-static const taper_switch_t *switch_of(const taper_allocator_t *allocator, uint8_t i, uint8_t session) {
+static const taper_switch_t *switch_of(const round_t *round, uint8_t i) {
     static const taper_switch_t fresh = {0};
-    return allocator->state[i].session == session ? &allocator->state[i] : &fresh;
+    const taper_switch_t *state = &round->allocator->state[i];
+    return state->session == round->snapshot->demand[i].session ? state : &fresh;
 }
 
 static bool held(const taper_switch_t *state, bool on, uint32_t now_ms, uint32_t least_ms) {
@@ -76,35 +78,42 @@ static bool held(const taper_switch_t *state, bool on, uint32_t now_ms, uint32_t
 }
 
 /** Current to start from for a wish: with a minimum, a wish below it becomes the minimum or nothing. */
-static int32_t wished_mA(const round_t *round, const taper_switch_t *state, uint8_t i) {
+static int32_t wished_mA(const round_t *round, uint8_t i) {
     const taper_demand_t *demand = &round->snapshot->demand[i];
     const int32_t wish_mA = current_of_mA(demand, (int64_t)taper_max_i32(round->proposal->wish_W[i], 0) * 1000);
     if (wish_mA >= demand->min_mA) {
         return wish_mA;
     }
-    const bool stays_on = held(state, true, round->snapshot->now_ms, round->config->min_on_ms);
+    const bool stays_on = held(switch_of(round, i), true, round->snapshot->now_ms, round->config->min_on_ms);
     return stays_on || wish_mA >= demand->min_mA / 2 ? demand->min_mA : 0;
 }
 
-/** Current that uses a ceiling whole: rounded up to the step of the wire, and at least the minimum. */
+/** Current for a ceiling, rounded down, but at least the minimum: less than that cannot be offered. */
 static int32_t ceiling_mA(const round_t *round, uint8_t i) {
     const taper_demand_t *demand = &round->snapshot->demand[i];
     const int32_t ceiling_W = taper_max_i32(round->proposal->ceiling_W[i], round->proposal->wish_W[i]);
     if (ceiling_W <= 0) {
         return 0;
     }
-    const int32_t needed_mA = current_of_mA(demand, (int64_t)ceiling_W * 1000 + demand->W_per_A - 1);
-    const int32_t rounded_mA = taper_min_i32(needed_mA, INT32_MAX - TAPER_CURRENT_STEP_mA) + TAPER_CURRENT_STEP_mA - 1;
-    return taper_max_i32(whole_steps(rounded_mA), demand->min_mA);
+    const int32_t useful_mA = taper_min_i32(current_of_mA(demand, (int64_t)ceiling_W * 1000), demand->max_mA);
+    return taper_max_i32(whole_steps(useful_mA), demand->min_mA);
 }
 
-static bool may_have_current(const round_t *round, const taper_allocator_t *allocator, uint8_t i) {
+/** The same rounded up: the last step carries the part of the ceiling that rounding down left out. */
+static int32_t ceiling_rounded_up_mA(const round_t *round, uint8_t i) {
+    const taper_demand_t *demand = &round->snapshot->demand[i];
+    const int32_t whole_mA = ceiling_mA(round, i);
+    const int64_t ceiling_mW =
+        (int64_t)taper_max_i32(round->proposal->ceiling_W[i], round->proposal->wish_W[i]) * 1000;
+    return (int64_t)whole_mA * demand->W_per_A < ceiling_mW ? whole_mA + TAPER_CURRENT_STEP_mA : whole_mA;
+}
+
+static bool may_have_current(const round_t *round, uint8_t i) {
     if (i >= round->snapshot->count || !round->snapshot->demand[i].active) {
         return false;
     }
-    const taper_demand_t *demand = &round->snapshot->demand[i];
-    const taper_switch_t *state = switch_of(allocator, i, demand->session);
-    return demand->min_mA == 0 || !held(state, false, round->snapshot->now_ms, round->config->min_off_ms);
+    const bool kept_off = held(switch_of(round, i), false, round->snapshot->now_ms, round->config->min_off_ms);
+    return round->snapshot->demand[i].min_mA == 0 || !kept_off;
 }
 
 static void note_switch(taper_switch_t *state, const taper_demand_t *demand, bool on, uint32_t now_ms) {
@@ -116,26 +125,31 @@ static void note_switch(taper_switch_t *state, const taper_demand_t *demand, boo
     }
 }
 
+/** One pass in the order of rank: raise every connector that may have current towards `target`. */
+static void raise_all(round_t *round, int32_t (*target)(const round_t *, uint8_t)) {
+    for (uint8_t place = 0; place < round->snapshot->count; place++) {
+        const uint8_t i = round->proposal->rank[place];
+        if (may_have_current(round, i)) {
+            raise(round, i, target(round, i));
+        }
+    }
+}
+
 void taper_allocate(taper_allocator_t *allocator, const taper_station_config_t *config,
                     const taper_snapshot_t *snapshot, const taper_proposal_t *proposal, int32_t site_limit_W,
                     taper_setpoints_t *setpoints) {
     round_t round = {
-        .config = config, .snapshot = snapshot, .proposal = proposal, .current_mA = setpoints->current_mA};
+        .config = config,
+        .snapshot = snapshot,
+        .proposal = proposal,
+        .allocator = allocator,
+        .current_mA = setpoints->current_mA,
+    };
     memset(setpoints, 0, sizeof *setpoints);
     open_rooms(&round, site_limit_W);
-    for (uint8_t place = 0; place < snapshot->count; place++) {
-        const uint8_t i = proposal->rank[place];
-        if (may_have_current(&round, allocator, i)) {
-            const taper_switch_t *state = switch_of(allocator, i, snapshot->demand[i].session);
-            raise(&round, i, wished_mA(&round, state, i));
-        }
-    }
-    for (uint8_t place = 0; place < snapshot->count; place++) {
-        const uint8_t i = proposal->rank[place];
-        if (may_have_current(&round, allocator, i)) {
-            raise(&round, i, ceiling_mA(&round, i));
-        }
-    }
+    raise_all(&round, wished_mA);
+    raise_all(&round, ceiling_mA);
+    raise_all(&round, ceiling_rounded_up_mA);
     for (uint8_t i = 0; i < snapshot->count; i++) {
         note_switch(&allocator->state[i], &snapshot->demand[i], setpoints->current_mA[i] > 0, snapshot->now_ms);
     }

@@ -2,15 +2,19 @@
 
 #include "taper/types.h"
 
+void taper_decoding_refuse(taper_decoding_t *decoding) {
+    decoding->bad_field = true;
+    decoding->refused = true;
+}
+
 int32_t taper_field_decode(const taper_field_t *field, int32_t raw, taper_decoding_t *decoding) {
     if (raw >= field->low && raw <= field->high) {
         return raw * field->step;
     }
-    if (raw != field->absent) {
-        decoding->bad_field = true;
-    }
     if (field->absent == TAPER_FIELD_ALWAYS) {
-        decoding->refused = true;
+        taper_decoding_refuse(decoding);
+    } else if (raw != field->absent) {
+        decoding->bad_field = true;
     }
     return TAPER_ABSENT;
 }
@@ -40,11 +44,4 @@ int32_t taper_field_encode(const taper_field_t *field, int32_t value) {
     /* Limited first, so that the greatest value cannot run over when it is rounded up. */
     const int32_t limited = taper_clamp_i32(value, field->low * field->step, field->high * field->step);
     return divide(limited, field->step, field->rounding);
-}
-
-void taper_refuse_unless(bool known, taper_decoding_t *decoding) {
-    if (!known) {
-        decoding->bad_field = true;
-        decoding->refused = true;
-    }
 }

@@ -38,8 +38,8 @@ int32_t taper_field_decode(const taper_field_t *field, int32_t raw, taper_decodi
 /** @return the raw value for the wire: rounded, moved to the nearest end of the range, or the absent code. */
 int32_t taper_field_encode(const taper_field_t *field, int32_t value);
 
-/** Note in `decoding` that an enumeration has a value that the DBC does not name: nobody may guess what it means. */
-void taper_refuse_unless(bool known, taper_decoding_t *decoding);
+/** Refuse a frame with an enumeration that the DBC does not name: nobody may guess what it means. */
+void taper_decoding_refuse(taper_decoding_t *decoding);
 
 void taper_decode_site_limit(const uint8_t *data, taper_message_t *message, taper_decoding_t *decoding);
 void taper_decode_setpoint(const uint8_t *data, taper_message_t *message, taper_decoding_t *decoding);

@@ -40,7 +40,7 @@ bool taper_encode_site_limit(const taper_message_t *message, uint8_t *data) {
     return taper_dbc_site_limit_pack(data, &raw, TAPER_FRAME_LENGTH) == TAPER_FRAME_LENGTH;
 }
 
-static bool command_known(unsigned command) {
+static bool command_is_named(unsigned command) {
     switch (command) {
     case TAPER_COMMAND_PAUSE:
     case TAPER_COMMAND_CHARGE:
@@ -54,7 +54,10 @@ void taper_decode_setpoint(const uint8_t *data, taper_message_t *message, taper_
     struct taper_dbc_setpoint_t raw;
     taper_setpoint_t *setpoint = &message->as.setpoint;
     (void)taper_dbc_setpoint_unpack(&raw, data, TAPER_FRAME_LENGTH);
-    taper_refuse_unless(command_known(raw.command), decoding);
+    if (!command_is_named(raw.command)) {
+        taper_decoding_refuse(decoding);
+        return;
+    }
     setpoint->command = (taper_command_t)raw.command;
     setpoint->current_mA = taper_field_decode(&setpoint_mA, raw.current, decoding);
     setpoint->validity_ms = taper_field_decode(&setpoint_validity_ms, raw.validity, decoding);
@@ -73,11 +76,11 @@ bool taper_encode_setpoint(const taper_message_t *message, uint8_t *data) {
         .phase_mask = (uint8_t)(setpoint->phase_mask & 0x07u),
         .session = setpoint->session,
     };
-    return command_known((unsigned)setpoint->command) &&
+    return command_is_named((unsigned)setpoint->command) &&
            taper_dbc_setpoint_pack(data, &raw, TAPER_FRAME_LENGTH) == TAPER_FRAME_LENGTH;
 }
 
-static bool pilot_known(unsigned pilot) {
+static bool pilot_is_named(unsigned pilot) {
     return pilot <= TAPER_PILOT_F;
 }
 
@@ -85,7 +88,10 @@ void taper_decode_evse_status(const uint8_t *data, taper_message_t *message, tap
     struct taper_dbc_evse_status_t raw;
     taper_evse_status_t *status = &message->as.evse_status;
     (void)taper_dbc_evse_status_unpack(&raw, data, TAPER_FRAME_LENGTH);
-    taper_refuse_unless(pilot_known(raw.pilot_state), decoding);
+    if (!pilot_is_named(raw.pilot_state)) {
+        taper_decoding_refuse(decoding);
+        return;
+    }
     status->pilot = (taper_pilot_t)raw.pilot_state;
     status->current_mA[0] = taper_field_decode(&measured_mA, raw.current_l1, decoding);
     status->current_mA[1] = taper_field_decode(&measured_mA, raw.current_l2, decoding);
@@ -116,7 +122,7 @@ bool taper_encode_evse_status(const taper_message_t *message, uint8_t *data) {
         .fallback_active = status->fallback_active,
         .ev_present = status->ev_present,
     };
-    return pilot_known((unsigned)status->pilot) &&
+    return pilot_is_named((unsigned)status->pilot) &&
            taper_dbc_evse_status_pack(data, &raw, TAPER_FRAME_LENGTH) == TAPER_FRAME_LENGTH;
 }
 
@@ -158,7 +164,7 @@ bool taper_encode_time_sync(const taper_message_t *message, uint8_t *data) {
     return taper_dbc_time_sync_pack(data, &raw, TAPER_FRAME_LENGTH) == TAPER_FRAME_LENGTH;
 }
 
-static bool mode_known(unsigned mode) {
+static bool mode_is_named(unsigned mode) {
     return mode <= TAPER_MODE_FAILSAFE;
 }
 
@@ -166,7 +172,10 @@ void taper_decode_ctrl_status(const uint8_t *data, taper_message_t *message, tap
     struct taper_dbc_ctrl_status_t raw;
     taper_ctrl_status_t *status = &message->as.ctrl_status;
     (void)taper_dbc_ctrl_status_unpack(&raw, data, TAPER_FRAME_LENGTH);
-    taper_refuse_unless(mode_known(raw.mode), decoding);
+    if (!mode_is_named(raw.mode)) {
+        taper_decoding_refuse(decoding);
+        return;
+    }
     status->mode = raw.mode;
     status->verdict = raw.solver_verdict;
     status->solve_ticks = raw.solve_ticks;
@@ -187,6 +196,6 @@ bool taper_encode_ctrl_status(const taper_message_t *message, uint8_t *data) {
         .waiting = status->waiting,
         .plan_version = status->plan_version,
     };
-    return mode_known(status->mode) &&
+    return mode_is_named(status->mode) &&
            taper_dbc_ctrl_status_pack(data, &raw, TAPER_FRAME_LENGTH) == TAPER_FRAME_LENGTH;
 }

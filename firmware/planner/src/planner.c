@@ -8,7 +8,15 @@
 #include "solver.h"
 
 _Static_assert(sizeof(OSQPFloat) == sizeof(taper_real_t), "solver and firmware are built for the same real type");
-_Static_assert(TAPER_MIN_SLICE <= TAPER_MAX_ITERATIONS, "one slice fits the budget");
+
+/** Penalty of a fresh solver: best over the station family (docs/results.md). */
+#define FIRST_RHO ((OSQPFloat)0.3)
+/** The penalty is looked at again after every so many iterations, and changed if it is this factor off. */
+#define RHO_INTERVAL 50
+#define RHO_TOLERANCE ((OSQPFloat)5)
+
+_Static_assert(TAPER_MIN_SLICE <= RHO_INTERVAL && RHO_INTERVAL % TAPER_MIN_SLICE == 0, "slices end where OSQP looks");
+_Static_assert(TAPER_MAX_ITERATIONS % RHO_INTERVAL == 0, "the budget is a number of intervals");
 
 int32_t taper_real_to_W(taper_real_t value, int32_t most_W) {
     if (!(value > 0)) { /* also NaN */
@@ -122,11 +130,13 @@ static uint8_t steps_since(const taper_planner_t *planner, uint32_t now_ms) {
 
 /** Forget everything that the solver learned: after garbage nothing of it can be trusted. */
 static void reset(taper_planner_t *planner) {
-    OSQPSolver *osqp = planner->solver->osqp;
+    const taper_solver_t *solver = planner->solver;
     memset(planner->session, 0, sizeof planner->session);
+    memset(solver->osqp->solution->x, 0, (size_t)solver->variables * sizeof(OSQPFloat));
+    memset(solver->osqp->solution->y, 0, (size_t)solver->rows * sizeof(OSQPFloat));
     planner->matrix_is_current = false;
-    osqp_update_rho(osqp, (OSQPFloat)0.3);
-    osqp_cold_start(osqp);
+    osqp_update_rho(solver->osqp, FIRST_RHO);
+    osqp_cold_start(solver->osqp);
 }
 
 void taper_planner_start(taper_planner_t *planner, const taper_snapshot_t *snapshot, const int32_t *site_limit_W) {
@@ -181,19 +191,44 @@ static taper_verdict_t judge(const taper_planner_t *planner) {
     return status == OSQP_SOLVED_INACCURATE ? TAPER_VERDICT_INACCURATE : TAPER_VERDICT_LATE;
 }
 
+/**
+ * Change the penalty if the residuals are out of balance. OSQP counts its iterations anew in every call and would never
+ * get there in small slices; done here, a solve takes the same steps however it is sliced.
+ */
+static void adapt_penalty(OSQPSolver *osqp) {
+    const OSQPFloat present = osqp->settings->rho;
+    const OSQPFloat better = osqp->info->rho_estimate;
+    if (isfinite(better) && (better > present * RHO_TOLERANCE || better * RHO_TOLERANCE < present)) {
+        osqp_update_rho(osqp, better);
+    }
+}
+
+/** Iterate up to the end of the slice or of the penalty's interval. @return iterations done. */
+static uint16_t iterate(taper_planner_t *planner, uint16_t most) {
+    OSQPSolver *osqp = planner->solver->osqp;
+    const uint16_t to_interval = (uint16_t)(RHO_INTERVAL - planner->iterations % RHO_INTERVAL);
+    osqp->settings->max_iter = most < to_interval ? most : to_interval;
+    const bool ran = osqp_solve(osqp) == 0;
+    const uint16_t done = (uint16_t)osqp->info->iter;
+    planner->iterations = (uint16_t)(planner->iterations + done);
+    planner->verdict = ran ? judge(planner) : TAPER_VERDICT_REFUSED;
+    if (planner->verdict == TAPER_VERDICT_SOLVING && planner->iterations % RHO_INTERVAL == 0) {
+        adapt_penalty(osqp);
+    }
+    return done;
+}
+
 taper_verdict_t taper_planner_run(taper_planner_t *planner, uint16_t iterations) {
     if (planner->verdict != TAPER_VERDICT_SOLVING) {
         return planner->verdict;
     }
-    OSQPSolver *osqp = planner->solver->osqp;
-    const int32_t left = TAPER_MAX_ITERATIONS - planner->iterations;
-    osqp->settings->max_iter = taper_clamp_i32(iterations, TAPER_MIN_SLICE, left);
-    const bool ran = osqp_solve(osqp) == 0;
-    planner->iterations = (uint16_t)(planner->iterations + osqp->info->iter);
+    int32_t left = taper_max_i32(iterations - iterations % TAPER_MIN_SLICE, TAPER_MIN_SLICE);
+    while (left > 0 && planner->verdict == TAPER_VERDICT_SOLVING) {
+        left -= iterate(planner, (uint16_t)left);
+    }
     planner->slices = (uint8_t)(planner->slices + (planner->slices < UINT8_MAX ? 1 : 0));
-    planner->verdict = ran ? judge(planner) : TAPER_VERDICT_REFUSED;
     if (taper_planner_is_usable(planner->verdict)) {
-        taper_project(&planner->horizon, osqp->solution->x);
+        taper_project(&planner->horizon, planner->solver->osqp->solution->x);
     }
     return planner->verdict;
 }

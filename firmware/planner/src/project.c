@@ -61,12 +61,10 @@ void taper_project(const taper_horizon_t *horizon, OSQPFloat *x) {
     projection_t projection = projection_of(horizon);
     const taper_station_config_t *config = horizon->config;
     const uint8_t steps = config->steps;
-    taper_real_t charged[TAPER_MAX_CONNECTORS] = {0}; /* after the last projected step */
-    taper_real_t solved[TAPER_MAX_CONNECTORS] = {0};  /* the same as the solver had it */
+    taper_real_t charged[TAPER_MAX_CONNECTORS] = {0}; /* up to the last projected step */
     for (uint8_t t = 0; t < steps; t++) {
         for (uint8_t i = 0; i < config->connector_count; i++) {
-            const taper_real_t wanted = x[(unsigned)i * steps + t] - solved[i];
-            solved[i] = x[(unsigned)i * steps + t];
+            const taper_real_t wanted = x[(unsigned)i * steps + t] - charged[i]; /* makes up for what was cut off */
             projection.power[i] = fmin(fmax(wanted, 0), allowed_power(&projection, i, t, charged[i]));
         }
         for (uint8_t k = 0; k < config->group_count; k++) {

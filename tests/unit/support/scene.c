@@ -2,8 +2,13 @@
 
 #include <string.h>
 
-#define CONNECTOR(index, owner, least_mA)                                                                    \
-    {.min_mA = (least_mA), .max_mA = 32000, .voltage_mV = 230000, .phases = 1, .group = (owner), .bus = 0,   \
+#define CONNECTOR(index, owner, least_mA) \
+    {.min_mA = (least_mA),                \
+     .max_mA = 32000,                     \
+     .voltage_mV = 230000,                \
+     .phases = 1,                         \
+     .group = (owner),                    \
+     .bus = 0,                            \
      .node = (index) + 1}
 
 static const taper_group_config_t groups[] = {
@@ -12,15 +17,24 @@ static const taper_group_config_t groups[] = {
     {.limit_W = 12000, .parent = 0},
 };
 
-static const taper_connector_config_t connectors[] = {
-    CONNECTOR(0, 1, 6000), CONNECTOR(1, 1, 6000), CONNECTOR(2, 2, 6000), CONNECTOR(3, 2, 6000)};
+static const taper_connector_config_t connectors[] = {CONNECTOR(0, 1, 6000), CONNECTOR(1, 1, 6000),
+                                                      CONNECTOR(2, 2, 6000), CONNECTOR(3, 2, 6000)};
 
 static const taper_connector_config_t continuous_connectors[] = {CONNECTOR(0, 1, 0), CONNECTOR(1, 1, 0),
                                                                  CONNECTOR(2, 2, 0), CONNECTOR(3, 2, 0)};
 
-#define STATION(table)                                                                                       \
-    {.name = "scene", .connectors = (table), .groups = groups, .failsafe_W = 4000, .tick_ms = 1000,           \
-     .min_on_ms = 300000, .min_off_ms = 300000, .step_s = 900, .steps = 24, .connector_count = 4, .group_count = 3}
+#define STATION(table)      \
+    {.name = "scene",       \
+     .connectors = (table), \
+     .groups = groups,      \
+     .failsafe_W = 4000,    \
+     .tick_ms = 1000,       \
+     .min_on_ms = 300000,   \
+     .min_off_ms = 300000,  \
+     .step_s = 900,         \
+     .steps = 24,           \
+     .connector_count = 4,  \
+     .group_count = 3}
 
 const taper_station_config_t *scene_four(void) {
     static const taper_station_config_t station = STATION(connectors);

@@ -18,7 +18,7 @@ typedef struct taper_solver taper_solver_t;
 
 /** Iterations after which a problem that has not converged is given up. */
 #define TAPER_MAX_ITERATIONS 500
-/** Least slice: the solver looks for convergence every so many iterations. */
+/** Slices are whole multiples of this: the solver looks for convergence every so many iterations. */
 #define TAPER_MIN_SLICE 10
 
 /** What is thought of the solver's last answer. On the bus in CTRL_STATUS. */
@@ -59,7 +59,8 @@ taper_status_t taper_planner_init(taper_planner_t *planner, const taper_solver_t
 void taper_planner_start(taper_planner_t *planner, const taper_snapshot_t *snapshot, const int32_t *site_limit_W);
 
 /**
- * Work one slice of at most `iterations` (>= TAPER_MIN_SLICE) on the present problem.
+ * Work one slice of at most `iterations` on the present problem, rounded down to a multiple of TAPER_MIN_SLICE but at
+ * least that. The steps taken, and so the answer, do not depend on how a solve is sliced.
  * @return the verdict; TAPER_VERDICT_SOLVING: call again. Cost: `iterations` x cost of an iteration (docs/results.md).
  */
 taper_verdict_t taper_planner_run(taper_planner_t *planner, uint16_t iterations);

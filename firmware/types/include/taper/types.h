@@ -146,7 +146,7 @@ typedef struct {
 /**
  * What a planner or a fallback asks for. It binds nobody: any bit pattern is safe, the allocator bounds it.
  * Connectors are served in the order of `rank`; each gets its wish if there is room, and what is left over then goes,
- * in the same order, up to the ceilings.
+ * in the same order, up to the ceilings, and last to the steps that rounding down left out of them.
  */
 typedef struct {
     int32_t wish_W[TAPER_MAX_CONNECTORS];

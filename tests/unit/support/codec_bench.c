@@ -1,0 +1,47 @@
+#include "codec_bench.h"
+
+#include <string.h>
+
+#include "unity.h"
+
+const taper_message_kind_t codec_bench_kinds[CODEC_BENCH_KINDS] = {
+    TAPER_MESSAGE_SITE_LIMIT, TAPER_MESSAGE_SETPOINT,   TAPER_MESSAGE_EVSE_STATUS, TAPER_MESSAGE_EV_STATUS,
+    TAPER_MESSAGE_EVSE_ELEC,  TAPER_MESSAGE_TIME_SYNC,  TAPER_MESSAGE_CTRL_STATUS, TAPER_MESSAGE_EV_PARAM_A,
+    TAPER_MESSAGE_EV_PARAM_B, TAPER_MESSAGE_EV_PARAM_C, TAPER_MESSAGE_EV_PARAM_D,
+};
+
+uint8_t codec_bench_node_of(taper_message_kind_t kind) {
+    switch (kind) {
+    case TAPER_MESSAGE_SITE_LIMIT:
+    case TAPER_MESSAGE_TIME_SYNC: return TAPER_NODE_GATEWAY;
+    case TAPER_MESSAGE_CTRL_STATUS: return TAPER_NODE_CONTROLLER;
+    default: return CODEC_BENCH_CONNECTOR;
+    }
+}
+
+taper_message_t codec_bench_message_of(taper_message_kind_t kind) {
+    taper_message_t message;
+    memset(&message, 0, sizeof message);
+    message.kind = kind;
+    message.node = codec_bench_node_of(kind);
+    return message;
+}
+
+taper_frame_t codec_bench_encode(const taper_message_t *message) {
+    taper_frame_t frame;
+    TEST_ASSERT_TRUE(taper_encode(message, &frame));
+    return frame;
+}
+
+taper_message_t codec_bench_decode(const taper_frame_t *frame) {
+    taper_message_t message;
+    bool bad = false;
+    TEST_ASSERT_TRUE(taper_decode(frame, &message, &bad));
+    TEST_ASSERT_FALSE(bad);
+    return message;
+}
+
+taper_frame_t codec_bench_frame_of(taper_message_kind_t kind) {
+    const taper_message_t message = codec_bench_message_of(kind);
+    return codec_bench_encode(&message);
+}
