@@ -194,7 +194,9 @@ def _run(table: Table, count: int, first: int, group_index: dict[str, int]) -> l
         raise table.error("kind", f'must be "AC" or "DC", not "{kind}"')
     phases = _phases(table, kind)
     voltage_mV = table.quantity("voltage_V", 1, MAX_VOLTAGE_mV, per_unit=1000)
-    min_dA = table.quantity("min_A", MIN_AC_CURRENT_dA if kind == "AC" else 0, MAX_CURRENT_dA, per_unit=10)
+    min_dA = table.quantity("min_A", 0, MAX_CURRENT_dA, per_unit=10)
+    if kind == "AC" and 0 < min_dA < MIN_AC_CURRENT_dA:
+        raise table.error("min_A", f"must be at least {MIN_AC_CURRENT_dA / 10:g} on AC, or 0 for none, not {min_dA / 10:g}")
     max_dA = table.quantity("max_A", 1, MAX_CURRENT_dA, per_unit=10)
     if min_dA > max_dA:
         raise table.error("min_A", f"above max_A ({min_dA / 10:g} > {max_dA / 10:g})")

@@ -26,7 +26,7 @@ void sim_fleet_init(sim_fleet_t *fleet, const taper_station_config_t *station, t
         evse->config = &station->connectors[i];
         fleet->at[evse->config->bus][evse->config->node] = (uint8_t)(i + 1);
         for (unsigned k = 0; k < TAPER_FRAMES_PER_CONNECTOR; k++) {
-            evse->counter[k] = (uint8_t)((seed % 16U + 7U * i + 3U * k) % 16U);
+            evse->counter[k] = (uint8_t)(((unsigned)(seed % 16U) + 7U * i + 3U * k) % 16U);
         }
     }
 }
@@ -42,7 +42,7 @@ void sim_fleet_plug(sim_fleet_t *fleet, unsigned connector, const sim_session_t 
 void sim_fleet_unplug(sim_fleet_t *fleet, unsigned connector) {
     sim_evse_t *evse = &fleet->evse[connector];
     evse->vehicle = NULL;
-    evse->setpoint_A = 0.0;
+    evse->setpoint_mA = 0;
     evse->current_A = 0.0;
     evse->power_kw = 0.0;
 }
@@ -82,7 +82,7 @@ static taper_message_t evse_status(const sim_evse_t *evse) {
     for (unsigned phase = 0; phase < evse->config->phases && phase < 3; phase++) {
         status->current_mA[phase] = nearest(evse->current_A * 1000.0);
     }
-    status->contactor_closed = evse->setpoint_A > 0.0 && evse->vehicle != NULL;
+    status->contactor_closed = evse->setpoint_mA > 0 && evse->vehicle != NULL;
     status->locked = evse->vehicle != NULL;
     status->fallback_active = !evse->setpoint_heard;
     status->ev_present = evse->vehicle != NULL;
@@ -185,9 +185,8 @@ static void hear(sim_evse_t *evse, const taper_frame_t *frame) {
     }
     evse->setpoint_heard = true;
     evse->setpoint_echo = evse->setpoint_check.counter;
-    evse->setpoint_A =
-        setpoint->command == TAPER_COMMAND_CHARGE ? (double)setpoint->current_mA / 1000.0 : 0.0;
-    evse->fallback_A = (double)setpoint->fallback_mA / 1000.0;
+    evse->setpoint_mA = setpoint->command == TAPER_COMMAND_CHARGE ? setpoint->current_mA : 0;
+    evse->fallback_mA = setpoint->fallback_mA;
 }
 
 void sim_fleet_listen(sim_fleet_t *fleet) {
@@ -209,7 +208,7 @@ void sim_fleet_listen(sim_fleet_t *fleet) {
     // Time stands still between ticks, so a setpoint is valid in the tick in which it came, and in no other.
     for (unsigned i = 0; i < fleet->station->connector_count; i++) {
         sim_evse_t *evse = &fleet->evse[i];
-        evse->setpoint_A = evse->setpoint_heard ? evse->setpoint_A : evse->fallback_A;
+        evse->setpoint_mA = evse->setpoint_heard ? evse->setpoint_mA : evse->fallback_mA;
     }
 }
 
@@ -227,8 +226,9 @@ void sim_fleet_draw(sim_fleet_t *fleet, unsigned connector, double now_s) {
     }
     const sim_session_t *vehicle = evse->vehicle;
     // A duty cycle below the minimum does not exist on the control pilot: the vehicle takes it for "no".
-    const double allowed_A = evse->setpoint_A * 1000.0 < evse->config->min_mA ? 0.0 : evse->setpoint_A;
-    const double offered_kw = fmin(allowed_A, (double)evse->config->max_mA / 1000.0) * kw_per_A(evse);
+    const int32_t allowed_mA = evse->setpoint_mA < evse->config->min_mA ? 0 : evse->setpoint_mA;
+    const int32_t offered_mA = taper_min_i32(allowed_mA, evse->config->max_mA);
+    const double offered_kw = (double)offered_mA / 1000.0 * kw_per_A(evse);
     const double taper_kw = fmax(vehicle->max_kw - vehicle->taper_kw * sim_evse_soc(evse), 0.0);
     const double missing_kw = missing_kwh(evse) / stay_h(fleet, evse, now_s);
     evse->power_kw = fmin(fmin(offered_kw, taper_kw), missing_kw);

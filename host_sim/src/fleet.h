@@ -20,13 +20,13 @@ typedef struct {
     const taper_connector_config_t *config;
     const sim_session_t *vehicle; /**< NULL: none */
     double energy_kwh;            /**< into the battery since plug-in */
-    double setpoint_A;            /**< per phase, what the vehicle may draw in this tick */
-    double fallback_A;            /**< told by the last setpoint */
     double current_A;             /**< per phase, drawn in this tick */
     double power_kw;
+    int32_t setpoint_mA; /**< per phase, what the vehicle may draw in this tick */
+    int32_t fallback_mA; /**< told by the last setpoint */
     taper_e2e_receiver_t setpoint_check;
-    bool setpoint_heard; /**< a valid one, in this tick */
-    uint8_t setpoint_echo;
+    bool setpoint_heard;                         /**< a valid one, in this tick */
+    uint8_t setpoint_echo;                       /**< counter of the last valid one */
     uint8_t session;                             /**< number on the wire, 1..255 */
     uint8_t revision;                            /**< of the EV_PARAM frames, 0..15 */
     uint8_t counter[TAPER_FRAMES_PER_CONNECTOR]; /**< of the protected frames */

@@ -5,7 +5,7 @@
 #include "taper/codec.h"
 #include "wire.h"
 
-/** The station takes times up to 24 days ahead; it need not know more than this. */
+/** The station takes times up to 24 days ahead; it needs to know no more than this. */
 #define CURVE_AHEAD_S (14 * INT64_C(86400))
 /** The curve is handed over again this often; at least this often while it is too long to be handed over whole. */
 #define CURVE_PERIOD_S      86400

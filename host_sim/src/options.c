@@ -19,19 +19,21 @@ static const char description[] =
     "Replay charging sessions through the Taper firmware and a simulated fleet, in virtual time."
     "\v"
     "SESSIONS CSV: a header, then one row per session, columns in any order: session_id, connector (1.., "
-    "empty: the "
-    "first free one), arrival_s, departure_s [s], battery_kwh [kWh], soc_arrival, soc_target [0..1], max_kw, "
-    "taper_kw "
-    "[kW], and optionally expected_departure_s [s], which is what the driver tells. A vehicle takes at most "
-    "max_kw - taper_kw * SOC.\n"
+    "empty: "
+    "the first free one), arrival_s, departure_s [s], battery_kwh [kWh], soc_arrival, soc_target [0..1], "
+    "max_kw, "
+    "taper_kw [kW], and optionally expected_departure_s [s], which is what the driver tells. A vehicle takes "
+    "at "
+    "most max_kw - taper_kw * SOC.\n"
     "\n"
     "LIMIT CSV: time_s [s], ascending, and limit_kw [kW]; each limit holds until the next one, the first one "
-    "before "
-    "its time too. The station's own limit holds besides.\n"
+    "before its time too. The station's own limit holds besides.\n"
     "\n"
-    "OUTPUT in DIR: summary.json, sessions.csv, steps.csv, connectors.csv. Equal runs give equal bytes, but "
-    "for "
-    "solve_ms in summary.json, which is wall time.\n"
+    "OUTPUT in DIR: summary.json, sessions.csv, steps.csv, connectors.csv. Equal runs give equal bytes, "
+    "except "
+    "for solve_ms in summary.json, which is wall time. A session that is plugged in at the first tick after "
+    "its "
+    "arrival has queued for 0 s.\n"
     "\n"
     "EXIT CODE: 0 good, 1 bad input, 2 bad command line, 3 a limit was exceeded.\n";
 
@@ -44,7 +46,7 @@ enum {
     KEY_TICK,
     KEY_MINIMUM,
     KEY_SEED,
-    KEY_OUT
+    KEY_OUT,
 };
 
 static const struct argp_option options[] = {

@@ -95,7 +95,7 @@ void sim_results_connector(sim_results_t *results, int64_t time_s, unsigned conn
     }
     fprintf(stream, "%" PRId64 ",%u,", time_s, connector + 1);
     put_field(stream, evse->vehicle->id);
-    fprintf(stream, ",%.3f,%.3f,%.5f\n", evse->setpoint_A, evse->current_A, sim_evse_soc(evse));
+    fprintf(stream, ",%.3f,%.3f,%.5f\n", evse->setpoint_mA / 1000.0, evse->current_A, sim_evse_soc(evse));
 }
 
 static double soc_departure(const sim_session_t *session, const sim_outcome_t *outcome) {
@@ -229,7 +229,7 @@ void sim_results_print(sim_results_t *results, FILE *stream) {
         const sim_spread_t solve_ms = sim_samples_spread(&results->solve_ms);
         fprintf(stream,
                 "%" PRIu32
-                " solves: %.0f iterations (p99 %.0f, max %.0f), %.2f ms (p99 %.2f, max %.2f) in the median\n",
+                " solves: iterations p50 %.0f, p99 %.0f, max %.0f; ms p50 %.2f, p99 %.2f, max %.2f\n",
                 results->solves, iterations.p50, iterations.p99, iterations.max, solve_ms.p50, solve_ms.p99,
                 solve_ms.max);
     }

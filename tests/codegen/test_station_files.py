@@ -174,7 +174,7 @@ MISTAKES = {
     "AC without phases": ("phases = 3\n", "", "connectors[1].phases", "missing"),
     "no voltage": ("voltage_V = 400", "voltage_V = 0", "connectors[2].voltage_V", "must be 0.001 to 1500, not 0"),
     "minimum above maximum": ("max_A = 32.0", "max_A = 5.9", "connectors[1].min_A", "above max_A (6 > 5.9)"),
-    "AC below 6 A": ("min_A = 6.0", "min_A = 5.9", "connectors[1].min_A", "must be 6 to 409.4, not 5.9"),
+    "AC below 6 A": ("min_A = 6.0", "min_A = 5.9", "connectors[1].min_A", "must be at least 6 on AC, or 0 for none, not 5.9"),
     "current too fine": (
         "max_A = 125.5",
         "max_A = 125.55",

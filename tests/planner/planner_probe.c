@@ -6,7 +6,7 @@
  *     demand CONNECTOR stored_Wh capacity_Wh need_Wh peak_W taper_W max_mA W_per_A departs_in_s
  *     solve
  *
- * `solve` prints "VERDICT ITERATIONS" and then T planned powers [W] a line for every connector; limits and demands are
+ * `solve` prints "VERDICT ITERATIONS" and then T planned powers (per unit) a line for every connector; limits and demands are
  * then forgotten, the warm start is not; `station` starts cold.
  */
 #include <stdio.h>
@@ -70,7 +70,7 @@ static void solve(void) {
     printf("%d %u\n", (int)planner.verdict, (unsigned)taper_planner_iterations(&planner));
     for (uint8_t i = 0; i < config->connector_count; i++) {
         for (uint8_t t = 0; t < config->steps; t++) {
-            printf("%d ", (int)taper_planner_power_W(&planner, i, t));
+            printf("%.9g ", (double)taper_planner_power(&planner, i, t));
         }
         printf("\n");
     }

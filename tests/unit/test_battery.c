@@ -72,6 +72,17 @@ static void test_extreme_values_do_not_overflow(void) {
     TEST_ASSERT_GREATER_THAN_INT32(0, taper_battery_useful_W(&demand, 1));
 }
 
+static void test_no_real_value_becomes_a_wild_power(void) {
+    const taper_real_t zero = 0;
+    TEST_ASSERT_EQUAL_INT32(0, taper_real_to_W(zero / zero, 5000));
+    TEST_ASSERT_EQUAL_INT32(0, taper_real_to_W(-1 / zero, 5000));
+    TEST_ASSERT_EQUAL_INT32(5000, taper_real_to_W(1 / zero, 5000));
+    TEST_ASSERT_EQUAL_INT32(5000, taper_real_to_W((taper_real_t)1e30, 5000));
+    TEST_ASSERT_EQUAL_INT32(0, taper_real_to_W(-3, 5000));
+    TEST_ASSERT_EQUAL_INT32(INT32_MAX, taper_real_to_W((taper_real_t)2147483647.0, INT32_MAX));
+    TEST_ASSERT_EQUAL_INT32(7, taper_real_to_W((taper_real_t)6.6, 5000));
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_the_limit_falls_on_a_line_from_the_peak);
@@ -80,6 +91,7 @@ int main(void) {
     RUN_TEST(test_useful_power_is_bounded_by_connector_taper_and_need);
     RUN_TEST(test_nothing_is_useful_for_an_inactive_demand);
     RUN_TEST(test_the_slope_is_the_taper_over_the_capacity);
+    RUN_TEST(test_no_real_value_becomes_a_wild_power);
     RUN_TEST(test_extreme_values_do_not_overflow);
     return UNITY_END();
 }

@@ -1,4 +1,4 @@
-/* Rounding and ends: what a value becomes after a trip over the wire. */
+/* What a value becomes after a trip over the wire: rounding, ends, and any bytes at all. */
 #include "support/codec_bench.h"
 #include "taper/types.h"
 #include "unity.h"
@@ -138,6 +138,37 @@ static void test_iterations_are_rounded_up_to_what_fits(void) {
     }
 }
 
+/* ---- Any bytes at all. */
+
+static uint32_t next_random(uint32_t *state) {
+    *state ^= *state << 13;
+    *state ^= *state >> 17;
+    *state ^= *state << 5;
+    return *state;
+}
+
+static void test_any_bytes_are_refused_or_stay_what_they_were_decoded_to(void) {
+    uint32_t state = 0x5ee2;
+    for (int i = 0; i < 200000; i++) {
+        const taper_message_kind_t kind = codec_bench_kinds[next_random(&state) % CODEC_BENCH_KINDS];
+        taper_frame_t frame = {.id = taper_can_id(kind, codec_bench_node_of(kind)),
+                               .length = TAPER_FRAME_LENGTH};
+        for (unsigned byte = 0; byte < TAPER_FRAME_LENGTH; byte++) {
+            frame.data[byte] = (uint8_t)(next_random(&state) >> 11);
+        }
+        taper_message_t message;
+        bool bad = false;
+        if (taper_decode(&frame, &message, &bad)) {
+            const taper_frame_t once = codec_bench_encode(&message);
+            const taper_message_t again = codec_bench_decode(&once);
+            const taper_frame_t twice = codec_bench_encode(&again);
+            TEST_ASSERT_EQUAL_HEX8_ARRAY(once.data, twice.data, TAPER_FRAME_LENGTH);
+        } else {
+            TEST_ASSERT_TRUE(bad);
+        }
+    }
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_a_limit_is_rounded_down_also_below_zero);
@@ -150,5 +181,6 @@ int main(void) {
     RUN_TEST(test_the_taper_is_rounded_down);
     RUN_TEST(test_a_capacity_is_rounded_to_the_nearest_and_zero_is_unknown);
     RUN_TEST(test_iterations_are_rounded_up_to_what_fits);
+    RUN_TEST(test_any_bytes_are_refused_or_stay_what_they_were_decoded_to);
     return UNITY_END();
 }

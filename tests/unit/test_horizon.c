@@ -106,10 +106,12 @@ static void test_sums_follow_the_course_for_the_site_and_the_table_below(void) {
 }
 
 static void test_the_linear_cost_is_the_worth_of_power_step_by_step(void) {
-    snapshot.demand[0].departs_in_s = 8 * 900; /* weight 1 + 2/8 */
+    snapshot.demand[0].departs_in_s = 8 * 900;
+    snapshot.demand[0].need_Wh = 7360; /* an hour: 4 of the 8 steps to spare */
     build();
-    assert_near(-1.25 * (0.95 - 0.95 * 0.95), horizon.linear[RATE(0, 0)]);
-    assert_near(-1.25 * pow(0.95, STEPS), horizon.linear[RATE(0, STEPS - 1)]);
+    const double weight = 1 + 2.0 / 8 + 1.0 / (4 + 4);
+    assert_near(-weight * (0.95 - 0.95 * 0.95), horizon.linear[RATE(0, 0)]);
+    assert_near(-weight * pow(0.95, STEPS), horizon.linear[RATE(0, STEPS - 1)]);
 }
 
 static void test_the_hessian_is_that_of_the_squared_powers(void) {

@@ -28,7 +28,7 @@ static void test_need_holds_while_the_meter_is_silent(void) {
     bench.elec.energy_Wh = 4000;
     bench_plug_in(&bench);
     bench.now_ms += 2 * TAPER_EVSE_ELEC_TIMEOUT_ms;
-    taper_session_expire(&bench.table, bench.now_ms);
+    bench_tick(&bench);
     bench_report_status(&bench);
     TEST_ASSERT_EQUAL_INT32(16000, bench_demand(&bench)->need_Wh);
 }
@@ -298,7 +298,7 @@ static void test_the_clock_is_held_over_for_longer_than_the_tick_counter_lasts(v
     const uint32_t days = 60;
     for (uint32_t hour = 0; hour < days * 24u; hour++) {
         bench.now_ms += 3600u * 1000u;
-        taper_session_expire(&bench.table, bench.now_ms);
+        bench_tick(&bench);
     }
     bench.b.departure_min = minute_of(NOON + days * 86400u) + 2;
     TEST_ASSERT_EQUAL_INT32(120, plugged_in()->departs_in_s);

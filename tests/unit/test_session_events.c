@@ -11,12 +11,14 @@ void setUp(void) {
 void tearDown(void) {}
 
 static bool revised(uint32_t *last) {
+    bench_tick(&bench);
     const bool changed = bench.table.revision != *last;
     *last = bench.table.revision;
     return changed;
 }
 
 static void test_a_session_that_begins_or_ends_is_an_event(void) {
+    bench_tick(&bench);
     uint32_t last = bench.table.revision;
     bench_plug_in(&bench);
     TEST_ASSERT_TRUE(revised(&last));
@@ -27,6 +29,7 @@ static void test_a_session_that_begins_or_ends_is_an_event(void) {
 static void test_a_session_that_ends_without_having_charged_is_an_event(void) {
     bench.ev.complete = true;
     bench_plug_in(&bench);
+    bench_tick(&bench);
     uint32_t last = bench.table.revision;
     bench_unplug(&bench);
     TEST_ASSERT_TRUE(revised(&last));
@@ -34,16 +37,18 @@ static void test_a_session_that_ends_without_having_charged_is_an_event(void) {
 
 static void test_repeated_reports_are_no_event(void) {
     bench_plug_in(&bench);
+    bench_tick(&bench);
     uint32_t last = bench.table.revision;
     for (int i = 0; i < 20; i++) {
         bench_live(&bench, 200);
-        taper_session_expire(&bench.table, bench.now_ms);
+        bench_tick(&bench);
         TEST_ASSERT_FALSE(revised(&last));
     }
 }
 
 static void test_new_parameters_are_an_event_once_they_are_whole(void) {
     bench_plug_in(&bench);
+    bench_tick(&bench);
     uint32_t last = bench.table.revision;
     bench_next_revision(&bench);
     bench_report_a(&bench);
@@ -55,8 +60,23 @@ static void test_new_parameters_are_an_event_once_they_are_whole(void) {
     TEST_ASSERT_TRUE(revised(&last));
 }
 
+static void test_new_parameters_of_a_vehicle_without_a_taper_are_an_event(void) {
+    bench_report_status(&bench);
+    bench_report_a(&bench);
+    bench_report_b(&bench);
+    bench_report_c(&bench);
+    bench_tick(&bench);
+    uint32_t last = bench.table.revision;
+    bench_next_revision(&bench);
+    bench_report_a(&bench);
+    bench_report_b(&bench);
+    bench_report_c(&bench);
+    TEST_ASSERT_TRUE(revised(&last));
+}
+
 static void test_a_met_target_is_an_event(void) {
     bench_plug_in(&bench);
+    bench_tick(&bench);
     uint32_t last = bench.table.revision;
     bench.elec.energy_Wh = 19990;
     bench_report_elec(&bench);
@@ -68,12 +88,13 @@ static void test_a_met_target_is_an_event(void) {
 
 static void test_a_connector_that_falls_silent_is_an_event_when_expired(void) {
     bench_plug_in(&bench);
+    bench_tick(&bench);
     uint32_t last = bench.table.revision;
     bench.now_ms += TAPER_EVSE_STATUS_TIMEOUT_ms;
-    taper_session_expire(&bench.table, bench.now_ms);
+    bench_tick(&bench);
     TEST_ASSERT_FALSE(revised(&last));
     bench.now_ms += 1;
-    taper_session_expire(&bench.table, bench.now_ms);
+    bench_tick(&bench);
     TEST_ASSERT_TRUE(revised(&last));
     bench_report_status(&bench);
     TEST_ASSERT_TRUE(revised(&last));
@@ -85,6 +106,7 @@ int main(void) {
     RUN_TEST(test_a_session_that_ends_without_having_charged_is_an_event);
     RUN_TEST(test_repeated_reports_are_no_event);
     RUN_TEST(test_new_parameters_are_an_event_once_they_are_whole);
+    RUN_TEST(test_new_parameters_of_a_vehicle_without_a_taper_are_an_event);
     RUN_TEST(test_a_met_target_is_an_event);
     RUN_TEST(test_a_connector_that_falls_silent_is_an_event_when_expired);
     return UNITY_END();

@@ -11,14 +11,22 @@ void setUp(void) {
 
 void tearDown(void) {}
 
+static void plug_in(void) {
+    bench_plug_in(&bench);
+    bench_tick(&bench);
+}
+
+/* Each report in a tick of its own. */
 static void report_energy(int32_t energy_Wh) {
     bench.elec.energy_Wh = energy_Wh;
     bench_report_elec(&bench);
+    bench_tick(&bench);
 }
 
 static void report_soc(int32_t soc_permille) {
     bench.ev.soc_permille = soc_permille;
     bench_report_ev(&bench);
+    bench_tick(&bench);
 }
 
 static void assert_stored(int32_t expected_Wh, bool estimated) {
@@ -32,14 +40,14 @@ static void assert_stored(int32_t expected_Wh, bool estimated) {
 
 static void test_the_first_soc_is_the_reported_one(void) {
     bench.a.soc_plug_in_permille = 100;
-    bench_plug_in(&bench);
+    plug_in();
     assert_stored(12000, false);
 }
 
 static void test_without_a_report_the_soc_at_plug_in_is_taken(void) {
     bench.ev.soc_permille = TAPER_ABSENT;
     bench.a.soc_plug_in_permille = 100;
-    bench_plug_in(&bench);
+    plug_in();
     assert_stored(6000, true);
 }
 
@@ -47,7 +55,7 @@ static void test_a_soc_at_plug_in_is_followed_by_all_the_energy_since(void) {
     bench.ev.soc_permille = TAPER_ABSENT;
     bench.a.soc_plug_in_permille = 100;
     bench.elec.energy_Wh = 3000; /* the station restarted in mid session */
-    bench_plug_in(&bench);
+    plug_in();
     assert_stored(9000, true);
     report_energy(3500);
     assert_stored(9500, true);
@@ -55,7 +63,7 @@ static void test_a_soc_at_plug_in_is_followed_by_all_the_energy_since(void) {
 
 static void test_a_reported_soc_already_holds_the_energy_before_it(void) {
     bench.elec.energy_Wh = 3000;
-    bench_plug_in(&bench);
+    plug_in();
     assert_stored(12000, false);
     report_energy(3100);
     assert_stored(12100, false);
@@ -65,6 +73,7 @@ static void test_a_soc_before_the_first_meter_reading_starts_there(void) {
     bench_report_status(&bench);
     bench_report_ev(&bench);
     bench_report_parameters(&bench);
+    bench_tick(&bench);
     report_energy(3000);
     assert_stored(12000, false);
     report_energy(3050);
@@ -73,7 +82,7 @@ static void test_a_soc_before_the_first_meter_reading_starts_there(void) {
 
 static void test_a_vehicle_that_never_tells_its_soc_has_none(void) {
     bench.ev.soc_permille = TAPER_ABSENT;
-    bench_plug_in(&bench);
+    plug_in();
     report_energy(5000);
     assert_stored(0, true);
     TEST_ASSERT_EQUAL_INT32(15000, bench_demand(&bench)->need_Wh); /* planned by energy */
@@ -81,7 +90,7 @@ static void test_a_vehicle_that_never_tells_its_soc_has_none(void) {
 
 static void test_a_soc_that_comes_late_is_taken(void) {
     bench.ev.soc_permille = TAPER_ABSENT;
-    bench_plug_in(&bench);
+    plug_in();
     report_energy(2000);
     report_soc(500);
     assert_stored(30000, false);
@@ -92,7 +101,7 @@ static void test_a_soc_that_comes_late_is_taken(void) {
 /* ---- Between reports. */
 
 static void test_measured_energy_resolves_finer_than_the_wire(void) {
-    bench_plug_in(&bench);
+    plug_in();
     for (int32_t energy_Wh = 10; energy_Wh <= 150; energy_Wh += 10) {
         report_energy(energy_Wh);
         report_soc(200);
@@ -100,8 +109,25 @@ static void test_measured_energy_resolves_finer_than_the_wire(void) {
     }
 }
 
+static void test_soc_and_energy_of_one_tick_count_once_in_either_order(void) {
+    for (int energy_first = 0; energy_first <= 1; energy_first++) {
+        setUp();
+        plug_in();
+        bench.elec.energy_Wh = 600;
+        bench.ev.soc_permille = 210;
+        if (energy_first != 0) {
+            bench_report_elec(&bench);
+        }
+        bench_report_ev(&bench);
+        if (energy_first == 0) {
+            bench_report_elec(&bench);
+        }
+        assert_stored(12600, false);
+    }
+}
+
 static void test_the_estimate_keeps_within_half_a_step_of_a_fresh_report(void) {
-    bench_plug_in(&bench);
+    plug_in();
     report_energy(400);
     assert_stored(12400, false);
     report_soc(200);
@@ -113,7 +139,7 @@ static void test_the_estimate_keeps_within_half_a_step_of_a_fresh_report(void) {
 static void test_a_report_that_is_a_little_old_may_lag_by_what_flowed_since(void) {
     bench.ev.soc_age_s = 36;
     bench.elec.power_W = 10000; /* 100 Wh in 36 s */
-    bench_plug_in(&bench);
+    plug_in();
     report_energy(400);
     report_soc(200);
     assert_stored(12250, false);
@@ -121,7 +147,7 @@ static void test_a_report_that_is_a_little_old_may_lag_by_what_flowed_since(void
 
 static void test_the_estimate_never_exceeds_the_battery(void) {
     bench.ev.soc_permille = 995;
-    bench_plug_in(&bench);
+    plug_in();
     bench.ev.soc_permille = TAPER_ABSENT;
     bench_report_ev(&bench);
     report_energy(5000);
@@ -130,14 +156,14 @@ static void test_the_estimate_never_exceeds_the_battery(void) {
 
 static void test_a_full_report_keeps_the_estimate_within_the_battery(void) {
     bench.ev.soc_permille = 1000;
-    bench_plug_in(&bench);
+    plug_in();
     report_energy(10);
     report_soc(1000);
     assert_stored(60000, false);
 }
 
 static void test_a_meter_that_goes_back_moves_nothing(void) {
-    bench_plug_in(&bench);
+    plug_in();
     report_energy(100);
     report_energy(20);
     assert_stored(12100, false);
@@ -146,7 +172,7 @@ static void test_a_meter_that_goes_back_moves_nothing(void) {
 }
 
 static void test_an_absent_meter_reading_moves_nothing(void) {
-    bench_plug_in(&bench);
+    plug_in();
     report_energy(100);
     report_energy(TAPER_ABSENT);
     assert_stored(12100, false);
@@ -158,7 +184,7 @@ static void test_an_absent_meter_reading_moves_nothing(void) {
 /* ---- Stale. */
 
 static void test_stale_soc_is_estimated_from_energy(void) {
-    bench_plug_in(&bench);
+    plug_in();
     bench.ev.soc_age_s = 61;
     report_energy(3000);
     report_soc(200);
@@ -166,7 +192,7 @@ static void test_stale_soc_is_estimated_from_energy(void) {
 }
 
 static void test_a_soc_of_60_s_still_counts(void) {
-    bench_plug_in(&bench);
+    plug_in();
     bench.ev.soc_age_s = 60;
     report_energy(400);
     report_soc(200);
@@ -178,12 +204,12 @@ static void test_a_soc_of_60_s_still_counts(void) {
 static void test_a_soc_of_unknown_age_is_stale(void) {
     bench.ev.soc_age_s = TAPER_ABSENT;
     bench.a.soc_plug_in_permille = 300;
-    bench_plug_in(&bench);
+    plug_in();
     assert_stored(18000, true);
 }
 
 static void test_a_silent_vehicle_is_estimated_after_its_timeout(void) {
-    bench_plug_in(&bench);
+    plug_in();
     bench.now_ms += TAPER_EV_STATUS_TIMEOUT_ms;
     bench_report_status(&bench);
     assert_stored(12000, false);
@@ -197,7 +223,7 @@ static void test_a_silent_vehicle_is_estimated_after_its_timeout(void) {
 /* ---- Jumps. */
 
 static void test_a_jump_is_not_believed_until_three_reports_agree(void) {
-    bench_plug_in(&bench);
+    plug_in();
     report_soc(500);
     assert_stored(12000, true);
     report_soc(505);
@@ -207,14 +233,14 @@ static void test_a_jump_is_not_believed_until_three_reports_agree(void) {
 }
 
 static void test_the_estimate_goes_on_by_energy_during_a_jump(void) {
-    bench_plug_in(&bench);
+    plug_in();
     report_soc(500);
     report_energy(800);
     assert_stored(12800, true);
 }
 
 static void test_a_jump_down_is_a_jump_too(void) {
-    bench_plug_in(&bench);
+    plug_in();
     report_soc(100);
     report_soc(100);
     assert_stored(12000, true);
@@ -223,7 +249,7 @@ static void test_a_jump_down_is_a_jump_too(void) {
 }
 
 static void test_a_jump_that_goes_away_is_forgotten(void) {
-    bench_plug_in(&bench);
+    plug_in();
     report_soc(500);
     report_soc(500);
     report_soc(200);
@@ -234,7 +260,7 @@ static void test_a_jump_that_goes_away_is_forgotten(void) {
 }
 
 static void test_jumps_that_disagree_are_not_believed(void) {
-    bench_plug_in(&bench);
+    plug_in();
     for (int i = 0; i < 6; i++) {
         report_soc(i % 2 == 0 ? 500 : 800);
         assert_stored(12000, true);
@@ -242,22 +268,22 @@ static void test_jumps_that_disagree_are_not_believed(void) {
 }
 
 static void test_two_percent_beside_the_estimate_is_not_a_jump(void) {
-    bench_plug_in(&bench);
+    plug_in();
     report_soc(220);
     assert_stored(13050, false); /* 22 % - 0.25 % */
     setUp();
-    bench_plug_in(&bench);
+    plug_in();
     report_soc(225);
     assert_stored(12000, true);
 }
 
 static void test_a_new_session_has_no_jump_pending(void) {
-    bench_plug_in(&bench);
+    plug_in();
     report_soc(500);
     report_soc(500);
     bench_unplug(&bench);
     bench.ev.soc_permille = 100;
-    bench_plug_in(&bench);
+    plug_in();
     assert_stored(6000, false);
     report_soc(500);
     assert_stored(6000, true);
@@ -272,7 +298,7 @@ static void test_without_a_sound_capacity_there_is_neither_soc_nor_taper(void) {
         setUp();
         bench.a.capacity_Wh = unsound[i];
         bench.a.soc_plug_in_permille = 300;
-        bench_plug_in(&bench);
+        plug_in();
         report_energy(1000);
         report_soc(250);
         const taper_demand_t *demand = bench_demand(&bench);
@@ -290,14 +316,14 @@ static void test_the_ends_of_the_sound_capacities_are_sound(void) {
         setUp();
         bench.a.capacity_Wh = sound[i];
         bench.ev.soc_permille = 1000;
-        bench_plug_in(&bench);
+        plug_in();
         TEST_ASSERT_EQUAL_INT32(sound[i], bench_demand(&bench)->capacity_Wh);
         TEST_ASSERT_EQUAL_INT32(sound[i], bench_demand(&bench)->stored_Wh);
     }
 }
 
 static void test_a_corrected_capacity_keeps_the_soc(void) {
-    bench_plug_in(&bench);
+    plug_in();
     bench_next_revision(&bench);
     bench.a.capacity_Wh = 80000;
     bench_report_parameters(&bench);
@@ -305,7 +331,7 @@ static void test_a_corrected_capacity_keeps_the_soc(void) {
 }
 
 static void test_a_capacity_that_is_withdrawn_and_told_again_starts_anew(void) {
-    bench_plug_in(&bench);
+    plug_in();
     report_energy(100);
     bench_next_revision(&bench);
     bench.a.capacity_Wh = TAPER_ABSENT;
@@ -327,6 +353,7 @@ int main(void) {
     RUN_TEST(test_a_vehicle_that_never_tells_its_soc_has_none);
     RUN_TEST(test_a_soc_that_comes_late_is_taken);
     RUN_TEST(test_measured_energy_resolves_finer_than_the_wire);
+    RUN_TEST(test_soc_and_energy_of_one_tick_count_once_in_either_order);
     RUN_TEST(test_the_estimate_keeps_within_half_a_step_of_a_fresh_report);
     RUN_TEST(test_a_report_that_is_a_little_old_may_lag_by_what_flowed_since);
     RUN_TEST(test_the_estimate_never_exceeds_the_battery);

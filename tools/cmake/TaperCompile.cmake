@@ -18,13 +18,21 @@ add_library(taper_strict INTERFACE)
 target_compile_options(taper_strict INTERFACE
     -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wdouble-promotion -Wvla -Werror)
 
-# taper_layer(NAME SOURCES ... DEPENDS ...): firmware/NAME as library taper_NAME with its own include folder. A layer
-# sees the headers of what it depends on and no others, so an upward include does not compile.
+# Layers without floating point are compiled so that using it is an error, where the compiler can say so.
+include(CheckCCompilerFlag)
+check_c_compiler_flag(-mgeneral-regs-only TAPER_CAN_FORBID_FLOAT)
+
+# taper_layer(NAME [FLOAT] SOURCES ... DEPENDS ...): firmware/NAME as library taper_NAME with its own include folder. A
+# layer sees the headers of what it depends on and no others, so an upward include does not compile. Without FLOAT it
+# may not use floating point.
 function(taper_layer name)
-    cmake_parse_arguments(LAYER "" "" "SOURCES;DEPENDS" ${ARGN})
+    cmake_parse_arguments(LAYER "FLOAT" "" "SOURCES;DEPENDS" ${ARGN})
     add_library(taper_${name} STATIC ${LAYER_SOURCES})
     target_include_directories(taper_${name} PUBLIC include)
     list(TRANSFORM LAYER_DEPENDS PREPEND taper_)
     target_link_libraries(taper_${name} PUBLIC ${LAYER_DEPENDS} PRIVATE taper_strict)
+    if(TAPER_CAN_FORBID_FLOAT AND NOT LAYER_FLOAT)
+        target_compile_options(taper_${name} PRIVATE -mgeneral-regs-only)
+    endif()
     set_property(GLOBAL APPEND PROPERTY TAPER_CORE_LIBRARIES taper_${name})
 endfunction()

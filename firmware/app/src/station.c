@@ -34,21 +34,11 @@ taper_status_t taper_station_init(taper_station_t *station, const taper_station_
     return TAPER_OK;
 }
 
-/** Who wants energy, as far as a plan depends on it. */
-static bool same_vehicles(const taper_snapshot_t *a, const taper_snapshot_t *b) {
-    for (uint8_t i = 0; i < a->count; i++) {
-        if (a->demand[i].active != b->demand[i].active || a->demand[i].session != b->demand[i].session) {
-            return false;
-        }
-    }
-    return true;
-}
-
 /** Events that make the planner think again; otherwise it does so once a step. */
-static bool plan_is_due(const taper_station_t *station, const taper_snapshot_t *before, int32_t site_limit_W) {
+static bool plan_is_due(const taper_station_t *station, int32_t site_limit_W) {
     const uint32_t step_ms = station->options.config->step_s * UINT32_C(1000);
     return station->planner.verdict == TAPER_VERDICT_NONE || station->planned_limit_W != site_limit_W ||
-           station->planned_revision != station->sessions.revision || !same_vehicles(before, &station->snapshot) ||
+           station->planned_revision != station->sessions.revision ||
            taper_elapsed_ms(station->snapshot.now_ms, station->planner.started_ms) >= step_ms;
 }
 
@@ -83,12 +73,12 @@ static void keep_plan(taper_station_t *station) {
 }
 
 /** One slice of planning: start a problem if one is due, work on the one under way, keep the result. */
-static void plan(taper_station_t *station, const taper_snapshot_t *before, int32_t site_limit_W) {
+static void plan(taper_station_t *station, int32_t site_limit_W) {
     if (station->options.solver == NULL || station->options.policy != NULL) {
         return;
     }
     const uint32_t began_us = clock_us(station);
-    if (station->planner.verdict != TAPER_VERDICT_SOLVING && plan_is_due(station, before, site_limit_W)) {
+    if (station->planner.verdict != TAPER_VERDICT_SOLVING && plan_is_due(station, site_limit_W)) {
         start_plan(station, site_limit_W);
     }
     if (station->planner.verdict != TAPER_VERDICT_SOLVING) {
@@ -157,11 +147,11 @@ static void allocate(taper_station_t *station, taper_mode_t mode, int32_t site_l
 }
 
 void taper_station_step(taper_station_t *station, uint32_t now_ms) {
-    const taper_snapshot_t before = station->snapshot;
     taper_station_receive(station, now_ms);
+    taper_session_update(&station->sessions, now_ms);
     taper_session_snapshot(&station->sessions, now_ms, &station->snapshot);
     station->limit_now = taper_limits_now(&station->limits, now_ms);
-    plan(station, &before, station->limit_now.site_W);
+    plan(station, station->limit_now.site_W);
     const taper_mode_t mode = decide_mode(station);
     propose(station, mode, station->limit_now.site_W);
     allocate(station, mode, station->limit_now.site_W);

@@ -81,8 +81,12 @@ static void take_frame(taper_station_t *station, const taper_frame_t *frame, uin
     if (!is_good(&station->counters, receiver, frame)) {
         return;
     }
-    if (!taper_decode(frame, &message, &bad_field) || bad_field) {
+    const bool usable = taper_decode(frame, &message, &bad_field);
+    if (!usable || bad_field) {
         taper_count(&station->counters.bad_fields);
+    }
+    if (!usable) {
+        return;
     }
     if (message.kind == TAPER_MESSAGE_SITE_LIMIT) {
         taper_limits_apply(&station->limits, &message.as.site_limit, now_ms);
@@ -140,6 +144,7 @@ static taper_ctrl_status_t status_of(const taper_station_t *station) {
     taper_ctrl_status_t status = {
         .mode = (uint8_t)station->supervisor.mode,
         .verdict = (uint8_t)station->planner.verdict,
+        .limit_source = (uint8_t)station->limit_now.source,
         .solve_ticks = station->planner.slices,
         .iterations = taper_planner_iterations(&station->planner),
         .plan_version = (uint8_t)station->counters.plans,

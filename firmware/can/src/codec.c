@@ -68,6 +68,9 @@ bool taper_decode(const taper_frame_t *frame, taper_message_t *message, bool *ba
     if (decoding.bad_field) {
         *bad_field = true;
     }
+    if (decoding.refused) {
+        memset(message, 0, sizeof *message); /* nothing to act on, even for a caller that does not look */
+    }
     return !decoding.refused;
 }
 

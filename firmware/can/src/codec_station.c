@@ -178,6 +178,7 @@ void taper_decode_ctrl_status(const uint8_t *data, taper_message_t *message, tap
     }
     status->mode = raw.mode;
     status->verdict = raw.solver_verdict;
+    status->limit_source = raw.limit_source;
     status->solve_ticks = raw.solve_ticks;
     status->iterations = (uint16_t)taper_field_decode(&iterations, raw.iterations, decoding);
     status->active = raw.active;
@@ -190,6 +191,7 @@ bool taper_encode_ctrl_status(const taper_message_t *message, uint8_t *data) {
     const struct taper_dbc_ctrl_status_t raw = {
         .mode = status->mode,
         .solver_verdict = (uint8_t)(status->verdict & 0x0Fu),
+        .limit_source = status->limit_source,
         .solve_ticks = status->solve_ticks,
         .iterations = (uint8_t)taper_field_encode(&iterations, status->iterations),
         .active = status->active,

@@ -66,23 +66,37 @@ static taper_real_t presence(int32_t departs_in_s, uint16_t step_s, uint8_t t) {
     return (taper_real_t)left_s / (taper_real_t)step_s;
 }
 
-/** The prefer-the-urgent weight: 3 in the last step before departure, falling towards 1. */
-static taper_real_t urgency(int32_t departs_in_s, uint16_t step_s) {
-    const int32_t steps = departs_in_s / step_s;
-    return 1 + (taper_real_t)2 / (taper_real_t)taper_max_i32(steps, 1);
+static taper_real_t allowed_W(const taper_demand_t *demand) {
+    return (taper_real_t)((int64_t)demand->max_mA * demand->W_per_A) / 1000;
+}
+
+/** Steps that a vehicle could wait and still be served: its stay less the time its need takes at the present limit. */
+static taper_real_t laxity_steps(const taper_demand_t *demand, uint16_t step_s) {
+    const taper_real_t limit_W = taper_real_min(allowed_W(demand), (taper_real_t)taper_battery_limit_W(demand));
+    const taper_real_t charging_s = limit_W > 0 ? (taper_real_t)demand->need_Wh * 3600 / limit_W : 0;
+    return taper_real_max((taper_real_t)demand->departs_in_s - charging_s, 0) / (taper_real_t)step_s;
+}
+
+/**
+ * The weight w_i: who leaves soon comes first, and who has little time to spare. The second part sees beyond the
+ * horizon, which the rows cannot: on stays longer than it, it recovers most of what the first alone loses
+ * (docs/results.md, "The weight").
+ */
+static taper_real_t urgency(const taper_demand_t *demand, uint16_t step_s) {
+    const int32_t steps = demand->departs_in_s / step_s;
+    return 1 + (taper_real_t)2 / (taper_real_t)taper_max_i32(steps, 1) + 1 / (laxity_steps(demand, step_s) + 4);
 }
 
 static chain_t chain_of(const taper_horizon_t *horizon, const taper_demand_t *demand) {
     const uint16_t step_s = horizon->config->step_s;
     const taper_real_t step_h = (taper_real_t)step_s / 3600;
-    const taper_real_t allowed_W = (taper_real_t)((int64_t)demand->max_mA * demand->W_per_A) / 1000;
     const taper_real_t slope = taper_battery_slope_per_h(demand) * step_h;
     return (chain_t){
-        .rate = allowed_W / horizon->base_W,
+        .rate = allowed_W(demand) / horizon->base_W,
         .taper = (taper_real_t)taper_battery_limit_W(demand) / horizon->base_W,
         .slope = slope < 1 ? slope : 1, /* a battery that fills within one step: the taper row then bounds v(i,t) */
         .need = (taper_real_t)demand->need_Wh / (horizon->base_W * step_h),
-        .weight = urgency(demand->departs_in_s, step_s),
+        .weight = urgency(demand, step_s),
         .departs_in_s = demand->departs_in_s,
     };
 }
@@ -103,7 +117,7 @@ static void write_idle(taper_horizon_t *horizon, uint8_t i) {
     horizon->taper_keep[i] = 1;
 }
 
-static void write_chain(taper_horizon_t *horizon, uint8_t i, const chain_t *chain) {
+static void write_chain(taper_horizon_t *horizon, uint8_t i, const chain_t *chain, const int32_t *site_limit_W) {
     const uint8_t steps = horizon->config->steps;
     const unsigned taper_row = (unsigned)horizon->config->connector_count * steps + i * (steps - 1U);
     taper_real_t worth = chain->weight * TAPER_DISCOUNT; /* of a unit of energy in step t */
@@ -114,9 +128,9 @@ static void write_chain(taper_horizon_t *horizon, uint8_t i, const chain_t *chai
         horizon->linear[v] = next - worth;
         worth = next;
         horizon->lower[v] = 0;
-        horizon->upper[v] = chain->rate * there;
+        horizon->upper[v] = taper_real_min(chain->rate * there, (taper_real_t)site_limit_W[t] / horizon->base_W);
         if (t == 0) {
-            horizon->upper[v] = fmin(horizon->upper[v], chain->taper);
+            horizon->upper[v] = taper_real_min(horizon->upper[v], chain->taper);
             continue;
         }
         const bool tapers = chain->slope > 0 || chain->taper < chain->rate;
@@ -130,7 +144,8 @@ static unsigned target_row(const taper_station_config_t *config) {
     return (unsigned)config->connector_count * (2U * config->steps - 1U);
 }
 
-static void write_connector(taper_horizon_t *horizon, uint8_t i, const taper_demand_t *demand) {
+static void write_connector(taper_horizon_t *horizon, uint8_t i, const taper_demand_t *demand,
+                            const int32_t *site_limit_W) {
     const unsigned target = target_row(horizon->config) + i;
     horizon->lower[target] = -TAPER_REAL_UNBOUNDED;
     horizon->upper[target] = TAPER_REAL_UNBOUNDED;
@@ -139,7 +154,7 @@ static void write_connector(taper_horizon_t *horizon, uint8_t i, const taper_dem
         return;
     }
     const chain_t chain = chain_of(horizon, demand);
-    write_chain(horizon, i, &chain);
+    write_chain(horizon, i, &chain, site_limit_W);
     horizon->upper[target] = chain.need * TAPER_TARGET_SCALE;
 }
 
@@ -169,7 +184,7 @@ void taper_horizon_build(taper_horizon_t *horizon, const taper_station_config_t 
     horizon->config = config;
     horizon->base_W = strongest_connector_W(config);
     for (uint8_t i = 0; i < config->connector_count; i++) {
-        write_connector(horizon, i, &snapshot->demand[i]);
+        write_connector(horizon, i, &snapshot->demand[i], site_limit_W);
     }
     for (uint8_t k = 0; k < config->group_count; k++) {
         write_group(horizon, k, site_limit_W);

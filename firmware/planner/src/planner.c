@@ -18,13 +18,6 @@ _Static_assert(sizeof(OSQPFloat) == sizeof(taper_real_t), "solver and firmware a
 _Static_assert(TAPER_MIN_SLICE <= RHO_INTERVAL && RHO_INTERVAL % TAPER_MIN_SLICE == 0, "slices end where OSQP looks");
 _Static_assert(TAPER_MAX_ITERATIONS % RHO_INTERVAL == 0, "the budget is a number of intervals");
 
-int32_t taper_real_to_W(taper_real_t value, int32_t most_W) {
-    if (!(value > 0)) { /* also NaN */
-        return 0;
-    }
-    return value < (taper_real_t)most_W ? (int32_t)(value + (taper_real_t)0.5) : most_W;
-}
-
 static bool solver_fits(const taper_solver_t *solver, const taper_station_config_t *config) {
     const OSQPInt variables = (OSQPInt)config->connector_count * config->steps;
     return solver->connectors == config->connector_count && solver->steps == config->steps &&
@@ -233,11 +226,15 @@ taper_verdict_t taper_planner_run(taper_planner_t *planner, uint16_t iterations)
     return planner->verdict;
 }
 
-int32_t taper_planner_power_W(const taper_planner_t *planner, uint8_t i, uint8_t t) {
+taper_real_t taper_planner_power(const taper_planner_t *planner, uint8_t i, uint8_t t) {
     const taper_solver_t *solver = planner->solver;
     const OSQPFloat *chain = solver->osqp->solution->x + (size_t)i * solver->steps;
-    const OSQPFloat energy = t > 0 ? chain[t] - chain[t - 1] : chain[0];
-    return taper_real_to_W(energy * planner->horizon.base_W, taper_real_to_W(planner->horizon.base_W, INT32_MAX));
+    return t > 0 ? chain[t] - chain[t - 1] : chain[0];
+}
+
+int32_t taper_planner_power_W(const taper_planner_t *planner, uint8_t i, uint8_t t) {
+    const taper_real_t base_W = planner->horizon.base_W;
+    return taper_real_to_W(taper_planner_power(planner, i, t) * base_W, taper_real_to_W(base_W, INT32_MAX));
 }
 
 uint16_t taper_planner_iterations(const taper_planner_t *planner) {

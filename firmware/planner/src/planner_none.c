@@ -28,6 +28,13 @@ bool taper_planner_is_usable(taper_verdict_t verdict) {
     return false;
 }
 
+taper_real_t taper_planner_power(const taper_planner_t *planner, uint8_t i, uint8_t t) {
+    (void)planner;
+    (void)i;
+    (void)t;
+    return 0;
+}
+
 int32_t taper_planner_power_W(const taper_planner_t *planner, uint8_t i, uint8_t t) {
     (void)planner;
     (void)i;

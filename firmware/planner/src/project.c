@@ -1,7 +1,5 @@
 #include "project.h"
 
-#include <tgmath.h>
-
 /** Where the row blocks of one problem begin. */
 typedef struct {
     const taper_horizon_t *horizon;
@@ -26,10 +24,10 @@ static taper_real_t allowed_power(const projection_t *projection, uint8_t i, uin
     taper_real_t allowed = horizon->upper[(unsigned)i * steps + t];
     if (t > 0) {
         const taper_real_t slope = 1 - horizon->taper_keep[i];
-        allowed = fmin(allowed, projection->taper_upper[(unsigned)i * (steps - 1U) + t - 1] - slope * charged);
+        allowed = taper_real_min(allowed, projection->taper_upper[(unsigned)i * (steps - 1U) + t - 1] - slope * charged);
     }
-    allowed = fmin(allowed, projection->target_upper[i] / TAPER_TARGET_SCALE - charged);
-    return fmax(allowed, 0);
+    allowed = taper_real_min(allowed, projection->target_upper[i] / TAPER_TARGET_SCALE - charged);
+    return taper_real_max(allowed, 0);
 }
 
 /** Shrink the powers of a group so that their sum keeps its limit in step t. */
@@ -65,7 +63,7 @@ void taper_project(const taper_horizon_t *horizon, OSQPFloat *x) {
     for (uint8_t t = 0; t < steps; t++) {
         for (uint8_t i = 0; i < config->connector_count; i++) {
             const taper_real_t wanted = x[(unsigned)i * steps + t] - charged[i]; /* makes up for what was cut off */
-            projection.power[i] = fmin(fmax(wanted, 0), allowed_power(&projection, i, t, charged[i]));
+            projection.power[i] = taper_real_min(taper_real_max(wanted, 0), allowed_power(&projection, i, t, charged[i]));
         }
         for (uint8_t k = 0; k < config->group_count; k++) {
             shrink_group(&projection, k, t);

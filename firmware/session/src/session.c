@@ -100,11 +100,9 @@ static void use_parameters(taper_session_table_t *table, taper_session_t *sessio
         taper_W != session->used.d.taper_W) {
         table->revision++;
     }
-    const int32_t old_capacity_Wh = taper_session_capacity_Wh(session);
     session->used = session->received;
     session->used.d.taper_W = taper_W;
     session->in_session = true;
-    taper_session_estimate_parameters(session, old_capacity_Wh, now_ms);
 }
 
 static void apply_status(taper_session_table_t *table, taper_session_t *session,
@@ -128,8 +126,8 @@ static void apply_status(taper_session_table_t *table, taper_session_t *session,
 
 static void apply_ev(taper_session_t *session, const taper_ev_status_t *ev, uint32_t now_ms) {
     session->ev = *ev;
+    session->soc_is_new = true;
     hear(&session->ev_heard, now_ms);
-    taper_session_estimate_soc(session, now_ms);
 }
 
 static void apply_elec(taper_session_t *session, const taper_evse_elec_t *elec, uint32_t now_ms) {
@@ -137,7 +135,6 @@ static void apply_elec(taper_session_t *session, const taper_evse_elec_t *elec, 
     hear(&session->elec_heard, now_ms);
     if (elec->energy_Wh != TAPER_ABSENT) {
         session->session_Wh = elec->energy_Wh;
-        taper_session_estimate_energy(session);
     }
 }
 
@@ -174,16 +171,6 @@ static void apply_time(taper_session_table_t *table, const taper_time_sync_t *ti
     hear(&table->clock_heard, now_ms - time->ms);
 }
 
-/* A vehicle that starts or stops to want energy is an event for the planner, whatever the cause. */
-static void note_activity(taper_session_table_t *table, uint8_t connector, uint32_t now_ms) {
-    taper_demand_t demand;
-    const bool active = taper_session_demand(table, connector, now_ms, &demand);
-    if (active != table->session[connector].wants_energy) {
-        table->session[connector].wants_energy = active;
-        table->revision++;
-    }
-}
-
 bool taper_session_apply(taper_session_table_t *table, const taper_message_t *message, uint32_t now_ms) {
     if (message->kind == TAPER_MESSAGE_TIME_SYNC) {
         apply_time(table, &message->as.time_sync, now_ms);
@@ -204,8 +191,17 @@ bool taper_session_apply(taper_session_table_t *table, const taper_message_t *me
     case TAPER_MESSAGE_EV_PARAM_D: apply_parameters(table, session, message, now_ms); break;
     default: return false;
     }
-    note_activity(table, (uint8_t)index, now_ms);
     return true;
+}
+
+/* A vehicle that starts or stops to want energy is an event for the planner, whatever the cause. */
+static void note_activity(taper_session_table_t *table, uint8_t connector, uint32_t now_ms) {
+    taper_demand_t demand;
+    const bool active = taper_session_demand(table, connector, now_ms, &demand);
+    if (active != table->session[connector].wants_energy) {
+        table->session[connector].wants_energy = active;
+        table->revision++;
+    }
 }
 
 static void expire(taper_heard_t *heard, uint32_t now_ms, uint32_t timeout_ms) {
@@ -220,13 +216,14 @@ static void carry_clock(taper_session_table_t *table, uint32_t now_ms) {
     }
 }
 
-void taper_session_expire(taper_session_table_t *table, uint32_t now_ms) {
+void taper_session_update(taper_session_table_t *table, uint32_t now_ms) {
     carry_clock(table, now_ms);
     for (uint8_t i = 0; i < table->config->connector_count; i++) {
         taper_session_t *session = &table->session[i];
         expire(&session->status_heard, now_ms, TAPER_EVSE_STATUS_TIMEOUT_ms);
         expire(&session->ev_heard, now_ms, TAPER_EV_STATUS_TIMEOUT_ms);
         expire(&session->elec_heard, now_ms, TAPER_EVSE_ELEC_TIMEOUT_ms);
+        taper_session_estimate(session, now_ms);
         note_activity(table, i, now_ms);
     }
 }

@@ -24,6 +24,20 @@ bool taper_session_soc_is_fresh(const taper_session_t *session, uint32_t now_ms)
     return (uint32_t)ev->soc_age_s * 1000u + since_ms <= TAPER_SOC_STALE_s * 1000u;
 }
 
+/* Move the estimate by what has flowed since it was last right. */
+static void follow_energy(taper_session_t *session, int32_t capacity_Wh) {
+    const int32_t energy_Wh = session->session_Wh;
+    if (session->stored_Wh == TAPER_ABSENT || energy_Wh == TAPER_ABSENT) {
+        return;
+    }
+    /* A meter that went back was reset: what flowed in between is unknown, what flows from here on counts. */
+    if (session->anchor_Wh != TAPER_ABSENT && energy_Wh > session->anchor_Wh) {
+        session->stored_Wh =
+            taper_min_i32(session->stored_Wh + (energy_Wh - session->anchor_Wh), capacity_Wh);
+    }
+    session->anchor_Wh = energy_Wh;
+}
+
 /* First estimate of a session, or none yet. A SOC of now stands for now; one at plug-in is followed by all the energy
    that was measured since. */
 static void begin(taper_session_t *session, int32_t capacity_Wh, uint32_t now_ms) {
@@ -34,42 +48,15 @@ static void begin(taper_session_t *session, int32_t capacity_Wh, uint32_t now_ms
     } else if (session->used.a.soc_plug_in_permille != TAPER_ABSENT) {
         session->stored_Wh = energy_at(session->used.a.soc_plug_in_permille, capacity_Wh);
         session->anchor_Wh = 0;
-        taper_session_estimate_energy(session);
     }
-}
-
-void taper_session_estimate_parameters(taper_session_t *session, int32_t old_capacity_Wh, uint32_t now_ms) {
-    const int32_t capacity_Wh = taper_session_capacity_Wh(session);
-    if (capacity_Wh == 0) {
-        session->stored_Wh = TAPER_ABSENT;
-    } else if (session->stored_Wh == TAPER_ABSENT) {
-        begin(session, capacity_Wh, now_ms);
-    } else if (old_capacity_Wh > 0) {
-        /* The same SOC of a battery that turned out to have another size. */
-        session->stored_Wh = (int32_t)((int64_t)session->stored_Wh * capacity_Wh / old_capacity_Wh);
-    }
-}
-
-void taper_session_estimate_energy(taper_session_t *session) {
-    const int32_t energy_Wh = session->session_Wh;
-    if (session->stored_Wh == TAPER_ABSENT || energy_Wh == TAPER_ABSENT) {
-        return;
-    }
-    /* A meter that went back was reset: what flowed in between is unknown, what flows from here on counts. */
-    if (session->anchor_Wh != TAPER_ABSENT && energy_Wh > session->anchor_Wh) {
-        const int32_t moved_Wh = session->stored_Wh + (energy_Wh - session->anchor_Wh);
-        session->stored_Wh = taper_min_i32(moved_Wh, taper_session_capacity_Wh(session));
-    }
-    session->anchor_Wh = energy_Wh;
 }
 
 /* What has flowed since the vehicle measured its SOC: the estimate may be ahead of the report by that. */
-static int64_t energy_since_report_Wh(const taper_session_t *session, uint32_t now_ms) {
-    const bool metered = taper_session_is_fresh(session->elec_heard, now_ms, TAPER_EVSE_ELEC_TIMEOUT_ms);
-    if (!metered || session->elec.power_W == TAPER_ABSENT) {
+static int32_t energy_since_report_Wh(const taper_session_t *session) {
+    if (!session->elec_heard.heard || session->elec.power_W == TAPER_ABSENT) {
         return 0;
     }
-    return (int64_t)session->elec.power_W * session->ev.soc_age_s / 3600;
+    return session->elec.power_W * session->ev.soc_age_s / 3600; /* 655 kW for a minute fits */
 }
 
 /* @return whether a SOC far from the estimate is to be believed by now. */
@@ -83,19 +70,12 @@ static bool jump_is_believed(taper_session_t *session) {
     return session->jump_count >= TAPER_SOC_JUMP_REPORTS;
 }
 
-void taper_session_estimate_soc(taper_session_t *session, uint32_t now_ms) {
-    const int32_t capacity_Wh = taper_session_capacity_Wh(session);
-    if (capacity_Wh == 0 || !taper_session_soc_is_fresh(session, now_ms)) {
-        return;
-    }
-    if (session->stored_Wh == TAPER_ABSENT) {
-        begin(session, capacity_Wh, now_ms);
-        return;
-    }
+/* Bring the estimate into the range that a reported SOC stands for, unless it lies too far off to be believed. */
+static void correct_by_soc(taper_session_t *session, int32_t capacity_Wh) {
     const int32_t reported_Wh = energy_at(session->ev.soc_permille, capacity_Wh);
-    const int64_t quantum_Wh = (int64_t)capacity_Wh * TAPER_SOC_QUANTUM_tenth_permille / 10000;
-    const int64_t low_Wh = reported_Wh - quantum_Wh;
-    const int64_t high_Wh = reported_Wh + quantum_Wh + energy_since_report_Wh(session, now_ms);
+    const int32_t quantum_Wh = (int32_t)((int64_t)capacity_Wh * TAPER_SOC_QUANTUM_tenth_permille / 10000);
+    const int32_t low_Wh = reported_Wh - quantum_Wh;
+    const int32_t high_Wh = reported_Wh + quantum_Wh + energy_since_report_Wh(session);
     const int32_t jump_Wh = energy_at(TAPER_SOC_JUMP_permille, capacity_Wh);
 
     if (session->stored_Wh < low_Wh - jump_Wh || session->stored_Wh > high_Wh + jump_Wh) {
@@ -106,7 +86,33 @@ void taper_session_estimate_soc(taper_session_t *session, uint32_t now_ms) {
         return;
     }
     session->jump_count = 0;
-    const int32_t low = taper_max_i32(taper_saturate_i32(low_Wh), 0);
-    const int32_t high = taper_min_i32(taper_saturate_i32(high_Wh), capacity_Wh);
-    session->stored_Wh = taper_clamp_i32(session->stored_Wh, low, high);
+    session->stored_Wh = taper_clamp_i32(session->stored_Wh, low_Wh, high_Wh);
+}
+
+/* The same SOC of a battery that turned out to have another size. */
+static void rescale(taper_session_t *session, int32_t capacity_Wh) {
+    if (session->stored_Wh != TAPER_ABSENT && session->stored_of_Wh > 0) {
+        session->stored_Wh = (int32_t)((int64_t)session->stored_Wh * capacity_Wh / session->stored_of_Wh);
+    }
+    session->stored_of_Wh = capacity_Wh;
+}
+
+void taper_session_estimate(taper_session_t *session, uint32_t now_ms) {
+    const int32_t capacity_Wh = taper_session_capacity_Wh(session);
+    const bool soc_is_new = session->soc_is_new && taper_session_soc_is_fresh(session, now_ms);
+    session->soc_is_new = false;
+    if (capacity_Wh == 0) {
+        session->stored_Wh = TAPER_ABSENT;
+        return;
+    }
+    if (capacity_Wh != session->stored_of_Wh) {
+        rescale(session, capacity_Wh);
+    }
+    if (session->stored_Wh == TAPER_ABSENT) {
+        begin(session, capacity_Wh, now_ms);
+    }
+    follow_energy(session, capacity_Wh);
+    if (soc_is_new && session->stored_Wh != TAPER_ABSENT) {
+        correct_by_soc(session, capacity_Wh);
+    }
 }

@@ -23,14 +23,11 @@ int32_t taper_session_capacity_Wh(const taper_session_t *session);
 /** Whether EV_STATUS gives a SOC that may correct the estimate at `now_ms`. */
 bool taper_session_soc_is_fresh(const taper_session_t *session, uint32_t now_ms);
 
-/** Parameters were put into use: begin the estimate, or carry it over from `old_capacity_Wh`. */
-void taper_session_estimate_parameters(taper_session_t *session, int32_t old_capacity_Wh, uint32_t now_ms);
-
-/** An EVSE_ELEC came: move the estimate by the energy since the last one. */
-void taper_session_estimate_energy(taper_session_t *session);
-
-/** An EV_STATUS came: correct the estimate by its SOC. */
-void taper_session_estimate_soc(taper_session_t *session, uint32_t now_ms);
+/**
+ * Bring the estimate of stored energy up to date with all reports of a tick. Energy comes first, so that a SOC is
+ * compared with what had flowed when it was reported, in whatever order the frames came.
+ */
+void taper_session_estimate(taper_session_t *session, uint32_t now_ms);
 
 /** Fill in `demand`; all zero unless active. @return `demand->active`. */
 bool taper_session_demand(const taper_session_table_t *table, uint8_t connector, uint32_t now_ms,

@@ -132,12 +132,17 @@ void bench_report_time(session_bench_t *bench, uint32_t unix_s, uint16_t ms, uin
     (void)taper_session_apply(&bench->table, &m, bench->now_ms);
 }
 
+void bench_tick(session_bench_t *bench) {
+    taper_session_update(&bench->table, bench->now_ms);
+}
+
 void bench_live(session_bench_t *bench, uint32_t ms) {
     bench->now_ms += ms;
     bench_plug_in(bench);
 }
 
 const taper_demand_t *bench_demand(session_bench_t *bench) {
+    bench_tick(bench);
     taper_session_snapshot(&bench->table, bench->now_ms, &bench->snapshot);
     return &bench->snapshot.demand[bench->connector];
 }

@@ -49,10 +49,13 @@ void bench_next_revision(session_bench_t *bench);
 void bench_unplug(session_bench_t *bench);
 void bench_report_time(session_bench_t *bench, uint32_t unix_s, uint16_t ms, uint8_t quality);
 
+/** The control tick: taper_session_update() now. */
+void bench_tick(session_bench_t *bench);
+
 /** Time goes on, and every report comes again at its end, unchanged. */
 void bench_live(session_bench_t *bench, uint32_t ms);
 
-/** The demand of the bench's connector now. Valid until the next call. */
+/** A tick, and the demand of the bench's connector after it. Valid until the next call. */
 const taper_demand_t *bench_demand(session_bench_t *bench);
 
 #endif

@@ -5,7 +5,8 @@
  * `base_W`, energy in units of base_W for one step. Variables are v(i,t), the energy that connector i has received
  * from now to the end of step t = 0..T-1, so that its power is u(i,t) = v(i,t) - v(i,t-1), v(i,-1) = 0.
  *
- *     minimise  sum_t g^(t+1) sum_i [ q/2 u(i,t)^2 - w_i u(i,t) ]        g = TAPER_DISCOUNT, q = TAPER_CURVATURE
+ *     minimise  sum_t g^(t+1) sum_i [ q/2 u(i,t)^2 - w_i u(i,t) ]        g = TAPER_DISCOUNT, q = TAPER_CURVATURE,
+ *               w_i = 1 + 2 / max(whole steps to departure, 1) + 1 / (laxity in steps + 4)
  *     rate      0 <= u(i,t) <= rate limit, 0 outside the stay            (paper, eq. 1 and 3)
  *     taper     u(i,t) + a_i v(i,t-1) <= limit at the present SOC        (paper, eq. 5; at t = 0 part of rate)
  *     target    v(i,T-1) <= need
@@ -13,6 +14,7 @@
  *
  * The variable (i,t) has index i*T + t. Rows stand in the order rate [N*T], taper [N*(T-1)], target [N], sum [K*T].
  * What does not apply is masked by bounds (l = u, or unbounded), never by the cost: that converges 2-5 times faster.
+ * A rate is also limited by the site's limit, which says nothing new but lets a limit of 0 converge at once.
  * Target and sum rows are scaled as below, which saves about a third of the iterations.
  */
 #ifndef TAPER_HORIZON_H

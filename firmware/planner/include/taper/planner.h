@@ -74,10 +74,10 @@ bool taper_planner_is_usable(taper_verdict_t verdict);
  */
 int32_t taper_planner_power_W(const taper_planner_t *planner, uint8_t i, uint8_t t);
 
+/** The same before rounding, in units of `horizon.base_W`. */
+taper_real_t taper_planner_power(const taper_planner_t *planner, uint8_t i, uint8_t t);
+
 /** Iterations spent on the last problem. */
 uint16_t taper_planner_iterations(const taper_planner_t *planner);
-
-/** A real of any value as whole watts: NaN and what is not positive gives 0, too large gives `most_W`. */
-int32_t taper_real_to_W(taper_real_t value, int32_t most_W);
 
 #endif

@@ -66,13 +66,15 @@ typedef struct {
     uint8_t param_seen;         /**< bit 0: A .. bit 3: D received since the vehicle came */
     bool vehicle_there;         /**< by the last EVSE_STATUS */
     bool in_session;            /**< `used` is set */
-    bool wants_energy;          /**< `active` of its demand at the last report */
+    bool wants_energy;          /**< `active` of its demand at the last update */
     uint32_t plugged_in_ms;     /**< when the vehicle, or else the session, was first seen */
     int32_t session_Wh;         /**< last energy measured in this session, or absent */
     int32_t stored_Wh;          /**< estimate, absent until SOC and capacity are known */
+    int32_t stored_of_Wh;       /**< capacity that the estimate was made for */
     int32_t anchor_Wh;          /**< session energy at which `stored_Wh` was right, absent until measured */
     int32_t jump_permille;      /**< last SOC that was not believed */
     uint8_t jump_count;         /**< reports that agreed on it, in a row */
+    bool soc_is_new;            /**< an EV_STATUS came since the last update */
 } taper_session_t;
 
 typedef struct {
@@ -80,8 +82,7 @@ typedef struct {
     taper_session_t session[TAPER_MAX_CONNECTORS];
     uint32_t unix_s;           /**< at `clock_heard.at_ms` */
     taper_heard_t clock_heard; /**< the last TIME_SYNC with quality above 0; held over for ever */
-    uint32_t revision; /**< changes with what should make the planner think again: a session begins or ends,
-                                    parameters change, a vehicle starts or stops to want energy, or falls silent */
+    uint32_t revision;         /**< changes with whatever should make the planner think again */
 } taper_session_table_t;
 
 /** Empty the table. `config` must outlive it. */
@@ -89,21 +90,24 @@ void taper_session_init(taper_session_table_t *table, const taper_station_config
 
 /**
  * Take in one decoded message received at `now_ms`. Messages that do not concern sessions, or come from a node that
- * the station does not have, are ignored. Cost: constant where connectors are numbered in the order of their nodes, else a scan for the index.
+ * the station does not have, are ignored. Cost: constant where connectors are numbered in the order of their nodes,
+ * else a scan for the index.
  * @return whether the message was for this table.
  */
 bool taper_session_apply(taper_session_table_t *table, const taper_message_t *message, uint32_t now_ms);
 
 /**
- * Forget reports past their timeout, so that a silent connector changes `revision`, and carry the clock on.
- * Call it once per control tick, before the snapshot; at least once a day. Cost: O(connectors).
+ * Draw the conclusions from what came in: forget reports past their timeout, bring the estimates of stored energy up to
+ * date, note in `revision` who starts or stops to want energy (sessions and parameters are noted as they come), and
+ * carry the clock on.
+ * Call it once per control tick, after the frames and before the snapshot; at least once a day. Cost: O(connectors).
  */
-void taper_session_expire(taper_session_table_t *table, uint32_t now_ms);
+void taper_session_update(taper_session_table_t *table, uint32_t now_ms);
 
 /**
- * What every vehicle wants at `now_ms`. Reports past their timeout do not count; what a vehicle asked for (complete,
- * pause, stop) and its error hold until it says otherwise, since vehicles that are done fall asleep.
- * Demands that are not active are all zero. Cost: O(connectors).
+ * What every vehicle wants at `now_ms`, that of the last update. Reports past their timeout do not count; what a
+ * vehicle asked for (complete, pause, stop) and its error hold until it says otherwise, since vehicles that are done
+ * fall asleep. Demands that are not active are all zero. Cost: O(connectors).
  */
 void taper_session_snapshot(const taper_session_table_t *table, uint32_t now_ms, taper_snapshot_t *snapshot);
 

@@ -107,6 +107,7 @@ typedef struct {
 typedef struct {
     uint8_t mode;           /**< taper_mode_t */
     uint8_t verdict;        /**< taper_verdict_t of the last plan */
+    uint8_t limit_source;   /**< taper_limit_source_t of the limit in force */
     uint8_t solve_ticks;    /**< control ticks that the last plan took */
     uint16_t iterations;    /**< of the last plan, 0..510 in steps of 2 */
     uint8_t active;         /**< vehicles that want energy */
