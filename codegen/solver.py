@@ -17,8 +17,8 @@ from workspace import Array, OsqpChanged, Real, Struct
 SETTINGS: dict[str, float | int] = {
     "scaling": 0,  # qp.py scales the rows; scaling in OSQP would be redone with every update of the matrices
     "rho": 0.3,
-    "eps_abs": 3e-4,
-    "eps_rel": 3e-4,
+    "eps_abs": 1e-3,  # the planner sets its own tolerance
+    "eps_rel": 1e-3,
     "max_iter": 500,
     "check_termination": 10,
     "adaptive_rho": 0,  # the planner does it, so that a solve in slices takes the same steps as one in one piece

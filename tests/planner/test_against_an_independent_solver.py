@@ -1,4 +1,8 @@
-"""The firmware's planner, run as it is, against Clarabel on the same problems: cost and constraints within 1e-3."""
+"""The firmware's planner, run as it is, against Clarabel on the same problems.
+
+In double precision cost and constraints agree within 1e-3. Single precision, as on a microcontroller, stops at a coarser
+tolerance, and on the largest station may run out of iterations with a usable plan.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +14,10 @@ import numpy as np
 import pytest
 from oracle import Demand, Problem, Station, read_station
 
-TOLERANCE = 1e-3
-USABLE = {2, 3}  # taper_verdict_t: solved, inaccurate
-SOLVED = 2
+SOLVED, INACCURATE = 2, 3  # taper_verdict_t
+DOUBLE = os.environ["TAPER_REAL"] == "double"
+TOLERANCE = 1e-3 if DOUBLE else 5e-3
+GOOD = {SOLVED} if DOUBLE else {SOLVED, INACCURATE}
 STATIONS = ["hub", "garage", "paper"]
 
 
@@ -35,7 +40,7 @@ def probe(station: Station, demands: dict[int, Demand], limit_W: list[int]) -> t
 
 def assert_agrees(station: Station, demands: dict[int, Demand], limit_W: list[int]) -> None:
     verdict, iterations, power = probe(station, demands, limit_W)
-    assert verdict == SOLVED
+    assert verdict in GOOD
     assert iterations <= 500
     problem = Problem(station, demands, limit_W)
     best = problem.least_cost()
@@ -102,7 +107,7 @@ def test_a_station_without_vehicles_plans_nothing(station: Station) -> None:
 def test_a_limit_of_zero_plans_nothing(station: Station) -> None:
     rng = random.Random(7)
     verdict, _, power = probe(station, fleet(rng, station, station.connectors), [0] * station.steps)
-    assert verdict in USABLE
+    assert verdict in GOOD
     assert not power.any()
 
 

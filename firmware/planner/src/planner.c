@@ -9,11 +9,17 @@
 
 _Static_assert(sizeof(OSQPFloat) == sizeof(taper_real_t), "solver and firmware are built for the same real type");
 
-/** Penalty of a fresh solver: best over the station family (docs/results.md). */
-#define FIRST_RHO ((OSQPFloat)0.3)
+/**
+ * Absolute and relative tolerance. In double, cost and constraints come well within 1e-3 of the optimum on every problem
+ * of the tests; float cannot keep more than 1e-3 apart on the larger stations and would run out of iterations.
+ */
+#define ABSOLUTE_TOLERANCE ((OSQPFloat)(TAPER_REAL_IS_DOUBLE ? 1e-4 : 1e-3))
+#define RELATIVE_TOLERANCE ((OSQPFloat)(TAPER_REAL_IS_DOUBLE ? 3e-4 : 1e-3))
+/** Least penalty, and that of a fresh solver: below it the primal residual stands still. */
+#define LEAST_RHO ((OSQPFloat)0.3)
 /** The penalty is looked at again after every so many iterations, and changed if it is this factor off. */
 #define RHO_INTERVAL 50
-#define RHO_TOLERANCE ((OSQPFloat)5)
+#define RHO_TOLERANCE ((OSQPFloat)2)
 
 _Static_assert(TAPER_MIN_SLICE <= RHO_INTERVAL && RHO_INTERVAL % TAPER_MIN_SLICE == 0, "slices end where OSQP looks");
 _Static_assert(TAPER_MAX_ITERATIONS % RHO_INTERVAL == 0, "the budget is a number of intervals");
@@ -58,6 +64,9 @@ taper_status_t taper_planner_init(taper_planner_t *planner, const taper_solver_t
         return TAPER_ERR_CONFIG;
     }
     planner->matrix_is_current = true;
+    solver->osqp->settings->eps_abs = ABSOLUTE_TOLERANCE;
+    solver->osqp->settings->eps_rel = RELATIVE_TOLERANCE;
+    osqp_update_rho(solver->osqp, LEAST_RHO);
     osqp_cold_start(solver->osqp);
     return TAPER_OK;
 }
@@ -128,7 +137,7 @@ static void reset(taper_planner_t *planner) {
     memset(solver->osqp->solution->x, 0, (size_t)solver->variables * sizeof(OSQPFloat));
     memset(solver->osqp->solution->y, 0, (size_t)solver->rows * sizeof(OSQPFloat));
     planner->matrix_is_current = false;
-    osqp_update_rho(solver->osqp, FIRST_RHO);
+    osqp_update_rho(solver->osqp, LEAST_RHO);
     osqp_cold_start(solver->osqp);
 }
 
@@ -190,8 +199,12 @@ static taper_verdict_t judge(const taper_planner_t *planner) {
  */
 static void adapt_penalty(OSQPSolver *osqp) {
     const OSQPFloat present = osqp->settings->rho;
-    const OSQPFloat better = osqp->info->rho_estimate;
-    if (isfinite(better) && (better > present * RHO_TOLERANCE || better * RHO_TOLERANCE < present)) {
+    const OSQPFloat estimate = osqp->info->rho_estimate;
+    if (!isfinite(estimate)) {
+        return;
+    }
+    const OSQPFloat better = taper_real_max(estimate, LEAST_RHO);
+    if (better > present * RHO_TOLERANCE || better * RHO_TOLERANCE < present) {
         osqp_update_rho(osqp, better);
     }
 }
