@@ -71,21 +71,55 @@ static int run_case(const sim_options_t *options, const sim_case_t *run) {
     return code;
 }
 
+/** Where the planning problems go. @return false, after one line on stderr, if they cannot go there. */
+static bool open_problems(const sim_options_t *options, FILE **file) {
+    *file = NULL;
+    if (options->problems_file == NULL) {
+        return true;
+    }
+    *file = fopen(options->problems_file, "w");
+    if (*file == NULL) {
+        perror(options->problems_file);
+    }
+    return *file != NULL;
+}
+
+static bool close_problems(const sim_options_t *options, FILE *file) {
+    if (file != NULL && fclose(file) != 0) {
+        perror(options->problems_file);
+        return false;
+    }
+    return true;
+}
+
+static void note_missing_planner(const sim_options_t *options) {
+    if (options->policy->propose == NULL && sim_solver(options->station) == NULL) {
+        fprintf(stderr, "taper-sim: note: this build has no planner; %s charges by earliest deadline first\n",
+                options->policy->name);
+    }
+}
+
 /** With all options known: read the files and run. @return the exit code of the program. */
 static int load_and_run(const sim_options_t *options, const taper_station_config_t *station) {
     sim_limits_t limits = {0};
     sim_sessions_t sessions = {0};
+    FILE *problems = NULL;
     int code = SIM_EXIT_INPUT;
     if (sim_sessions_load(&sessions, options->sessions_file, station->connector_count) &&
         load_limits(&limits, options, station->groups[0].limit_W / 1000.0) &&
-        (options->out == NULL || sim_output_check(options->out))) {
+        (options->out == NULL || sim_output_check(options->out)) && open_problems(options, &problems)) {
+        note_missing_planner(options);
         const sim_case_t run = {.station = station,
                                 .solver = sim_solver(options->station),
                                 .policy = options->policy,
                                 .sessions = &sessions,
                                 .limits = &limits,
-                                .seed = options->seed};
+                                .seed = options->seed,
+                                .problems = problems};
         code = run_case(options, &run);
+        if (!close_problems(options, problems)) {
+            code = SIM_EXIT_INPUT;
+        }
     }
     sim_sessions_free(&sessions);
     sim_limits_free(&limits);

@@ -10,7 +10,6 @@
 #include <string.h>
 
 #include "csv_table.h"
-#include "solver.h"
 #include "taper/stations.h"
 
 #define LONGEST_TICK_S 3600
@@ -47,6 +46,7 @@ enum {
     KEY_MINIMUM,
     KEY_SEED,
     KEY_OUT,
+    KEY_PROBLEMS,
 };
 
 static const struct argp_option options[] = {
@@ -59,6 +59,7 @@ static const struct argp_option options[] = {
     {"min-current-a", KEY_MINIMUM, "X", 0,
      "Least current per phase [A] of every connector; 0: any (default: the station's own)", 0},
     {"seed", KEY_SEED, "N", 0, "Decides in which order nodes send; no result depends on it (default: 0)", 0},
+    {"problems", KEY_PROBLEMS, "FILE", 0, "Write every planning problem to this file (input of planner_probe)", 0},
     {"out", KEY_OUT, "DIR", 0, "Write the results to this directory (default: only print a summary)", 0},
     {0},
 };
@@ -166,10 +167,6 @@ static void check(const sim_options_t *chosen, struct argp_state *state) {
         argp_error(state, "--min-current-a: above %g A, the most that a connector of this station gives",
                    most_A);
     }
-    if (chosen->policy->propose == NULL && sim_solver(chosen->station) == NULL) {
-        argp_error(state, "--policy: %s needs the planner, which was left out of this build",
-                   chosen->policy->name);
-    }
 }
 
 static error_t parse(int key, char *text, struct argp_state *state) {
@@ -184,6 +181,7 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     case KEY_MINIMUM: chosen->min_current_A = not_negative("--min-current-a", text, state); break;
     case KEY_SEED: chosen->seed = whole_number("--seed", text, 0, UINT64_MAX, state); break;
     case KEY_OUT: chosen->out = text; break;
+    case KEY_PROBLEMS: chosen->problems_file = text; break;
     case ARGP_KEY_ARG: argp_error(state, "unexpected argument '%s'", text); break;
     case ARGP_KEY_END: check(chosen, state); break;
     default: return ARGP_ERR_UNKNOWN;

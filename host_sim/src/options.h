@@ -21,6 +21,7 @@ typedef struct {
     const char *sessions_file;
     const char *limit_file; /**< NULL: none */
     const char *out;        /**< NULL: no files */
+    const char *problems_file; /**< NULL: none */
     const sim_policy_t *policy;
     unsigned station;     /**< index in taper_stations[] */
     double limit_kw;      /**< negative: not given */

@@ -8,6 +8,7 @@
 #include "gateway.h"
 #include "memory.h"
 #include "progress.h"
+#include "problems.h"
 #include "queue.h"
 
 /** Power above a limit by less than this is rounding of doubles [kW]. */
@@ -136,6 +137,9 @@ static void note_solve(world_t *world) {
     world->plans = station->counters.plans;
     sim_samples_add(&world->results->iterations, taper_planner_iterations(&station->planner));
     sim_samples_add(&world->results->solve_ms, station->last_solve_us / 1000.0);
+    if (world->run->problems != NULL && station->plan_made_ms == station->snapshot.now_ms) { // else: older snapshot
+        sim_problems_add(world->run->problems, station);
+    }
 }
 
 static bool run_tick(world_t *world, int64_t now_s) {
@@ -189,6 +193,9 @@ bool sim_world_run(const sim_case_t *run, sim_results_t *results) {
     sim_queue_init(&world->queue, run->sessions, &world->fleet, results->outcome);
     bool good = init_station(world);
     if (good) {
+        if (run->problems != NULL) {
+            sim_problems_begin(run->problems, &world->station);
+        }
         good = run_ticks(world);
     } else {
         fprintf(stderr, "taper-sim: the firmware refuses station %s with these options\n",

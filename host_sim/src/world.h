@@ -4,6 +4,7 @@
 
 #include <stdbool.h>
 #include <stdint.h>
+#include <stdio.h>
 
 #include "baselines.h"
 #include "limits_csv.h"
@@ -19,6 +20,7 @@ typedef struct {
     const sim_sessions_t *sessions;
     const sim_limits_t *limits; /**< nowhere above the station's own site limit */
     uint64_t seed;              /**< decides in which order nodes send, and nothing else */
+    FILE *problems;             /**< where the planning problems go; NULL: nowhere */
 } sim_case_t;
 
 /**

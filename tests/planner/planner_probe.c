@@ -1,17 +1,23 @@
 /*
- * The firmware's planner as a filter, for comparison with an independent solver (test_against_an_independent_solver.py).
+ * The firmware's planner as a filter, to compare it with other solvers on the same problems. `taper-sim --problems FILE`
+ * writes what it reads:
  *
- *     station NAME
+ *     station NAME                starts cold
+ *     time MS                     of the snapshot; 0 if not given
  *     limit W0 .. W(T-1)
- *     demand CONNECTOR stored_Wh capacity_Wh need_Wh peak_W taper_W max_mA W_per_A departs_in_s
+ *     demand CONNECTOR SESSION stored_Wh capacity_Wh need_Wh peak_W taper_W max_mA W_per_A departs_in_s
  *     solve
  *
- * `solve` prints "VERDICT ITERATIONS" and then T planned powers (per unit) a line for every connector; limits and demands are
- * then forgotten, the warm start is not; `station` starts cold.
+ * `solve` prints "VERDICT ITERATIONS MICROSECONDS" and then T planned powers (per unit) a line for every connector. With
+ * --numbers, the lines are instead those of the problem itself: linear cost, lower and upper bounds, and the taper
+ * factors. Limits and demands are then forgotten, the warm start is not.
  */
+#define _POSIX_C_SOURCE 199309L
+
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 #include "taper/planner.h"
 #include "taper/solvers.h"
@@ -53,43 +59,80 @@ static void read_limits(char *line) {
 
 static void read_demand(const char *line) {
     int i = 0;
-    taper_demand_t d = {.active = true, .session = 1};
-    if (sscanf(line, "demand %d %d %d %d %d %d %d %d %d", &i, &d.stored_Wh, &d.capacity_Wh, &d.need_Wh, &d.peak_W,
-               &d.taper_W, &d.max_mA, &d.W_per_A, &d.departs_in_s) != 9 ||
+    unsigned session = 0;
+    taper_demand_t d = {.active = true};
+    if (sscanf(line, "demand %d %u %d %d %d %d %d %d %d %d", &i, &session, &d.stored_Wh, &d.capacity_Wh, &d.need_Wh,
+               &d.peak_W, &d.taper_W, &d.max_mA, &d.W_per_A, &d.departs_in_s) != 10 ||
         i < 0 || i >= config->connector_count) {
         fail(line);
     }
+    d.session = (uint8_t)session;
     snapshot.demand[i] = d;
 }
 
-static void solve(void) {
-    snapshot.count = config->connector_count;
-    taper_planner_start(&planner, &snapshot, limit_W);
-    while (taper_planner_run(&planner, 50) == TAPER_VERDICT_SOLVING) {
-    }
-    printf("%d %u\n", (int)planner.verdict, (unsigned)taper_planner_iterations(&planner));
+static double now_us(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec * 1e6 + (double)now.tv_nsec / 1e3;
+}
+
+static void print_plan(void) {
     for (uint8_t i = 0; i < config->connector_count; i++) {
         for (uint8_t t = 0; t < config->steps; t++) {
             printf("%.9g ", (double)taper_planner_power(&planner, i, t));
         }
         printf("\n");
     }
+}
+
+static void print_reals(const taper_real_t *values, unsigned count) {
+    for (unsigned k = 0; k < count; k++) {
+        printf("%.17g ", (double)values[k]);
+    }
+    printf("\n");
+}
+
+static void print_numbers(void) {
+    const unsigned variables = (unsigned)config->connector_count * config->steps;
+    const unsigned rows = 2 * variables + (unsigned)config->group_count * config->steps;
+    print_reals(planner.horizon.linear, variables);
+    print_reals(planner.horizon.lower, rows);
+    print_reals(planner.horizon.upper, rows);
+    print_reals(planner.horizon.taper_keep, config->connector_count);
+}
+
+static void solve(bool numbers) {
+    snapshot.count = config->connector_count;
+    const double began_us = now_us();
+    taper_planner_start(&planner, &snapshot, limit_W);
+    while (taper_planner_run(&planner, TAPER_MAX_ITERATIONS) == TAPER_VERDICT_SOLVING) {
+    }
+    const double took_us = now_us() - began_us;
+    printf("%d %u %.1f\n", (int)planner.verdict, (unsigned)taper_planner_iterations(&planner), took_us);
+    if (numbers) {
+        print_numbers();
+    } else {
+        print_plan();
+    }
     memset(&snapshot, 0, sizeof snapshot);
 }
 
-int main(void) {
+int main(int argc, char **argv) {
     static char line[4096];
+    const bool numbers = argc == 2 && strcmp(argv[1], "--numbers") == 0;
     while (fgets(line, sizeof line, stdin) != NULL) {
         if (strncmp(line, "station", 7) == 0) {
             select_station(line);
         } else if (config == NULL) {
             fail(line);
+        } else if (strncmp(line, "time", 4) == 0) {
+            snapshot.now_ms = (uint32_t)strtoul(line + 4, NULL, 10);
         } else if (strncmp(line, "limit", 5) == 0) {
             read_limits(line);
         } else if (strncmp(line, "demand", 6) == 0) {
             read_demand(line);
         } else if (strncmp(line, "solve", 5) == 0) {
-            solve();
+            solve(numbers);
         } else {
             fail(line);
         }

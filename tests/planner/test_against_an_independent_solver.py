@@ -26,7 +26,7 @@ def probe(station: Station, demands: dict[int, Demand], limit_W: list[int]) -> t
     lines = [f"station {station.name}", "limit " + " ".join(map(str, limit_W))]
     for i, d in demands.items():
         lines.append(
-            f"demand {i} {d.stored_Wh} {d.capacity_Wh} {d.need_Wh} {d.peak_W} {d.taper_W} "
+            f"demand {i} 1 {d.stored_Wh} {d.capacity_Wh} {d.need_Wh} {d.peak_W} {d.taper_W} "
             f"{station.max_mA[i]} {station.W_per_A[i]} {d.departs_in_s}"
         )
     run = subprocess.run(
@@ -34,7 +34,7 @@ def probe(station: Station, demands: dict[int, Demand], limit_W: list[int]) -> t
         check=True,
     )
     head, *rows = run.stdout.splitlines()
-    verdict, iterations = map(int, head.split())
+    verdict, iterations = map(int, head.split()[:2])
     return verdict, iterations, np.array([[float(u) for u in row.split()] for row in rows])
 
 

@@ -1,0 +1,25 @@
+#include "problems.h"
+
+void sim_problems_begin(FILE *file, const taper_station_t *station) {
+    fprintf(file, "station %s\n", station->options.config->name);
+}
+
+void sim_problems_add(FILE *file, const taper_station_t *station) {
+    const taper_snapshot_t *snapshot = &station->snapshot;
+    int32_t course_W[TAPER_MAX_STEPS];
+    taper_limits_course(&station->limits, snapshot->now_ms, course_W);
+    fprintf(file, "time %lu\nlimit", (unsigned long)snapshot->now_ms);
+    for (unsigned t = 0; t < station->options.config->steps; t++) {
+        fprintf(file, " %ld", (long)course_W[t]);
+    }
+    fprintf(file, "\n");
+    for (unsigned i = 0; i < snapshot->count; i++) {
+        const taper_demand_t *d = &snapshot->demand[i];
+        if (d->active) {
+            fprintf(file, "demand %u %u %ld %ld %ld %ld %ld %ld %ld %ld\n", i, (unsigned)d->session, (long)d->stored_Wh,
+                    (long)d->capacity_Wh, (long)d->need_Wh, (long)d->peak_W, (long)d->taper_W, (long)d->max_mA,
+                    (long)d->W_per_A, (long)d->departs_in_s);
+        }
+    }
+    fprintf(file, "solve\n");
+}
