@@ -83,7 +83,7 @@ def read_station(path: Path, shown: str | None = None) -> Station:
     if not description.isprintable() or "*/" in description or "/*" in description:
         raise root.error("description", "must be one line of printable text without comment marks")
     horizon = root.table("horizon")
-    steps = horizon.integer("steps", 1, MAX_STEPS)
+    steps = horizon.integer("steps", 2, MAX_STEPS)
     step_s = horizon.integer("step_s", 60, 3600)
     horizon.end()
     control = root.table("control")

@@ -143,6 +143,27 @@ static void test_a_limit_that_the_curve_does_not_explain_is_taken_to_last(void) 
     TEST_ASSERT_EQUAL_INT32(2000, course_W[2]);
 }
 
+static void test_an_old_limit_does_not_come_back_when_the_clock_has_gone_round(void) {
+    gateway_says(20000, 1000);
+    for (uint64_t now_ms = 1000; now_ms <= UINT64_C(0x100000000) + 2000; now_ms += 3600000) {
+        taper_limits_update(&limits, (uint32_t)now_ms);
+    }
+    assert_now(4000, TAPER_LIMIT_FAILSAFE, 2000); /* 2^32 ms later */
+}
+
+static void test_the_last_point_of_a_curve_holds_for_months(void) {
+    point(1000, 20000);
+    point(5000, 10000);
+    TEST_ASSERT_EQUAL(TAPER_OK, taper_limits_set_curve(&limits, &curve));
+    uint32_t now_ms = 0;
+    for (int hour = 0; hour < 24 * 100; hour++) {
+        now_ms += 3600000;
+        taper_limits_update(&limits, now_ms);
+    }
+    gateway_says(25000, now_ms);
+    assert_now(10000, TAPER_LIMIT_CURVE, now_ms);
+}
+
 static void test_several_points_within_one_step_are_averaged(void) {
     int32_t course_W[TAPER_MAX_STEPS];
     point(900000, 9000);
@@ -170,6 +191,8 @@ int main(void) {
     RUN_TEST(test_the_course_has_the_limit_of_now_first_and_then_means);
     RUN_TEST(test_the_course_knows_of_rises);
     RUN_TEST(test_a_limit_that_the_curve_does_not_explain_is_taken_to_last);
+    RUN_TEST(test_an_old_limit_does_not_come_back_when_the_clock_has_gone_round);
+    RUN_TEST(test_the_last_point_of_a_curve_holds_for_months);
     RUN_TEST(test_several_points_within_one_step_are_averaged);
     return UNITY_END();
 }

@@ -1,6 +1,6 @@
 # Runs codegen at configure time, when an input changed, into <build>/generated: ${TAPER_GENERATED}.
 
-find_program(TAPER_PYTHON NAMES python3 HINTS ${CMAKE_SOURCE_DIR}/build/venv/bin NO_DEFAULT_PATH NO_CACHE)
+find_program(TAPER_PYTHON NAMES python3 HINTS ${PROJECT_SOURCE_DIR}/build/venv/bin NO_DEFAULT_PATH NO_CACHE)
 if(NOT TAPER_PYTHON)
     find_program(TAPER_PYTHON NAMES python3 NO_CACHE REQUIRED)
 endif()
@@ -8,7 +8,7 @@ endif()
 set(TAPER_GENERATED ${CMAKE_BINARY_DIR}/generated)
 
 file(GLOB TAPER_CODEGEN_INPUTS CONFIGURE_DEPENDS
-    ${CMAKE_SOURCE_DIR}/codegen/*.py ${CMAKE_SOURCE_DIR}/codegen/*.dbc ${CMAKE_SOURCE_DIR}/codegen/stations/*.toml)
+    ${PROJECT_SOURCE_DIR}/codegen/*.py ${PROJECT_SOURCE_DIR}/codegen/*.dbc ${PROJECT_SOURCE_DIR}/codegen/stations/*.toml)
 set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${TAPER_CODEGEN_INPUTS})
 
 function(taper_generate)
@@ -32,8 +32,8 @@ function(taper_generate)
     endif()
     message(STATUS "Generating stations ${stations} (${TAPER_REAL})")
     execute_process(
-        COMMAND ${TAPER_PYTHON} ${CMAKE_SOURCE_DIR}/codegen/generate.py ${arguments} --out ${TAPER_GENERATED}
-        WORKING_DIRECTORY ${CMAKE_SOURCE_DIR}
+        COMMAND ${TAPER_PYTHON} ${PROJECT_SOURCE_DIR}/codegen/generate.py ${arguments} --out ${TAPER_GENERATED}
+        WORKING_DIRECTORY ${PROJECT_SOURCE_DIR}
         RESULT_VARIABLE result OUTPUT_VARIABLE account ERROR_VARIABLE reason)
     if(NOT result EQUAL 0)
         message(FATAL_ERROR "codegen failed:\n${reason}\n"

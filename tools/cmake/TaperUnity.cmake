@@ -1,7 +1,7 @@
 # Unity, the test framework: from build/deps/unity (tools/fetch_unity takes it out of Debian's source package cjson),
 # otherwise from its maintainers' repository. The same pinned version either way; never committed.
 
-set(TAPER_UNITY_DIR ${CMAKE_SOURCE_DIR}/build/deps/unity CACHE PATH "Folder that holds unity.c, unity.h and unity_internals.h")
+set(TAPER_UNITY_DIR ${PROJECT_SOURCE_DIR}/build/deps/unity CACHE PATH "Folder that holds unity.c, unity.h and unity_internals.h")
 set(unity_dir ${TAPER_UNITY_DIR})
 if(NOT EXISTS ${unity_dir}/unity.c)
     message(STATUS "No Unity in ${unity_dir} (tools/fetch_unity puts it there): fetching it from its repository")

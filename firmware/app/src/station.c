@@ -7,6 +7,8 @@
 
 /** A plan that could not be renewed is followed this many steps, then it is no plan. */
 #define PLAN_LASTS_STEPS 2u
+/** After a plan that was no good, the next try. */
+#define RETRY_ms UINT32_C(60000)
 
 static bool options_are_sound(const taper_station_options_t *options) {
     return options->config != NULL && options->port != NULL && options->port->receive != NULL &&
@@ -34,12 +36,13 @@ taper_status_t taper_station_init(taper_station_t *station, const taper_station_
     return TAPER_OK;
 }
 
-/** Events that make the planner think again; otherwise it does so once a step. */
+/** Events that make the planner think again; otherwise it does so once a step, and sooner after a failure. */
 static bool plan_is_due(const taper_station_t *station, int32_t site_limit_W) {
     const uint32_t step_ms = station->options.config->step_s * UINT32_C(1000);
+    const uint32_t lasts_ms = station->plan_usable || step_ms < RETRY_ms ? step_ms : RETRY_ms;
     return station->planner.verdict == TAPER_VERDICT_NONE || station->planned_limit_W != site_limit_W ||
            station->planned_revision != station->sessions.revision ||
-           taper_elapsed_ms(station->snapshot.now_ms, station->planner.started_ms) >= step_ms;
+           taper_elapsed_ms(station->snapshot.now_ms, station->planner.started_ms) >= lasts_ms;
 }
 
 static void start_plan(taper_station_t *station, int32_t site_limit_W) {
@@ -78,11 +81,11 @@ static void plan(taper_station_t *station, int32_t site_limit_W) {
         return;
     }
     const uint32_t began_us = clock_us(station);
-    if (station->planner.verdict != TAPER_VERDICT_SOLVING && plan_is_due(station, site_limit_W)) {
-        start_plan(station, site_limit_W);
-    }
     if (station->planner.verdict != TAPER_VERDICT_SOLVING) {
-        return;
+        if (!plan_is_due(station, site_limit_W)) {
+            return;
+        }
+        start_plan(station, site_limit_W);
     }
     const taper_verdict_t verdict = taper_planner_run(&station->planner, station->options.iterations_per_tick);
     station->solve_us += clock_us(station) - began_us;
@@ -149,6 +152,7 @@ static void allocate(taper_station_t *station, taper_mode_t mode, int32_t site_l
 void taper_station_step(taper_station_t *station, uint32_t now_ms) {
     taper_station_receive(station, now_ms);
     taper_session_update(&station->sessions, now_ms);
+    taper_limits_update(&station->limits, now_ms);
     taper_session_snapshot(&station->sessions, now_ms, &station->snapshot);
     station->limit_now = taper_limits_now(&station->limits, now_ms);
     plan(station, station->limit_now.site_W);

@@ -2,8 +2,8 @@
 
 #include "taper/codec.h"
 
-/** Frames taken in one step: what every node may send in two control ticks. A babbling bus cannot hold the step up. */
-#define TAPER_MAX_FRAMES_PER_STEP (TAPER_MAX_CONNECTORS * 16u + 64u)
+/** Frames taken in one step: what all nodes send in three seconds. A babbling bus cannot hold the step up. */
+#define TAPER_MAX_FRAMES_PER_STEP (TAPER_MAX_CONNECTORS * 32u + 64u)
 
 /** Least validity of a setpoint, and how many control ticks it must outlive. */
 #define VALIDITY_FLOOR_ms 3000u
@@ -66,7 +66,11 @@ static bool is_good(taper_station_counters_t *counters, taper_e2e_receiver_t *re
         taper_count(&counters->crc_errors);
         return false;
     }
-    return taper_e2e_is_valid(receiver);
+    if (!taper_e2e_is_valid(receiver)) {
+        taper_count(&counters->frames_untrusted);
+        return false;
+    }
+    return true;
 }
 
 static void take_frame(taper_station_t *station, const taper_frame_t *frame, uint32_t now_ms) {
@@ -157,10 +161,18 @@ static taper_ctrl_status_t status_of(const taper_station_t *station) {
     return status;
 }
 
+static uint8_t bus_count(const taper_station_config_t *config) {
+    uint8_t buses = 0;
+    for (uint8_t i = 0; i < config->connector_count; i++) {
+        buses = config->connectors[i].bus >= buses ? (uint8_t)(config->connectors[i].bus + 1) : buses;
+    }
+    return buses;
+}
+
 static void send_status(taper_station_t *station) {
     taper_message_t message = {.kind = TAPER_MESSAGE_CTRL_STATUS, .node = TAPER_NODE_CONTROLLER};
     message.as.ctrl_status = status_of(station);
-    const uint8_t buses = (uint8_t)(station->options.config->connectors[station->options.config->connector_count - 1].bus + 1);
+    const uint8_t buses = bus_count(station->options.config);
     for (message.bus = 0; message.bus < buses; message.bus++) {
         send_message(station, &message, station->status_counter);
     }

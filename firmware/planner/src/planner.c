@@ -15,6 +15,11 @@ _Static_assert(sizeof(OSQPFloat) == sizeof(taper_real_t), "solver and firmware a
  */
 #define ABSOLUTE_TOLERANCE ((OSQPFloat)(TAPER_REAL_IS_DOUBLE ? 1e-4 : 1e-3))
 #define RELATIVE_TOLERANCE ((OSQPFloat)(TAPER_REAL_IS_DOUBLE ? 3e-4 : 1e-3))
+/**
+ * Tolerance of OSQP's tests for infeasibility. Standing still is always feasible and power is bounded, so they can only
+ * be wrong; and at the end of a slice their approximate form would throw the iterates away.
+ */
+#define NEVER_INFEASIBLE ((OSQPFloat)1e-20)
 /** Least penalty, and that of a fresh solver: below it the primal residual stands still. */
 #define LEAST_RHO ((OSQPFloat)0.3)
 /** The penalty is looked at again after every so many iterations, and changed if it is this factor off. */
@@ -46,6 +51,17 @@ static bool load_matrix(taper_planner_t *planner) {
     return planner->matrix_is_current;
 }
 
+/** Forget everything that the solver learned: after garbage nothing of it can be trusted. */
+static void reset(taper_planner_t *planner) {
+    const taper_solver_t *solver = planner->solver;
+    memset(planner->session, 0, sizeof planner->session);
+    memset(solver->osqp->solution->x, 0, (size_t)solver->variables * sizeof(OSQPFloat));
+    memset(solver->osqp->solution->y, 0, (size_t)solver->rows * sizeof(OSQPFloat));
+    planner->matrix_is_current = false;
+    osqp_update_rho(solver->osqp, LEAST_RHO);
+    osqp_cold_start(solver->osqp);
+}
+
 taper_status_t taper_planner_init(taper_planner_t *planner, const taper_solver_t *solver,
                                   const taper_station_config_t *config) {
     memset(planner, 0, sizeof *planner);
@@ -63,11 +79,11 @@ taper_status_t taper_planner_init(taper_planner_t *planner, const taper_solver_t
                              solver->a_count) != 0) {
         return TAPER_ERR_CONFIG;
     }
-    planner->matrix_is_current = true;
     solver->osqp->settings->eps_abs = ABSOLUTE_TOLERANCE;
     solver->osqp->settings->eps_rel = RELATIVE_TOLERANCE;
-    osqp_update_rho(solver->osqp, LEAST_RHO);
-    osqp_cold_start(solver->osqp);
+    solver->osqp->settings->eps_prim_inf = NEVER_INFEASIBLE;
+    solver->osqp->settings->eps_dual_inf = NEVER_INFEASIBLE;
+    reset(planner);
     return TAPER_OK;
 }
 
@@ -128,17 +144,6 @@ static uint8_t steps_since(const taper_planner_t *planner, uint32_t now_ms) {
     const uint32_t elapsed = taper_elapsed_ms(now_ms, planner->started_ms) / step_ms;
     const uint8_t most = (uint8_t)(planner->horizon.config->steps - 1);
     return elapsed < most ? (uint8_t)elapsed : most;
-}
-
-/** Forget everything that the solver learned: after garbage nothing of it can be trusted. */
-static void reset(taper_planner_t *planner) {
-    const taper_solver_t *solver = planner->solver;
-    memset(planner->session, 0, sizeof planner->session);
-    memset(solver->osqp->solution->x, 0, (size_t)solver->variables * sizeof(OSQPFloat));
-    memset(solver->osqp->solution->y, 0, (size_t)solver->rows * sizeof(OSQPFloat));
-    planner->matrix_is_current = false;
-    osqp_update_rho(solver->osqp, LEAST_RHO);
-    osqp_cold_start(solver->osqp);
 }
 
 void taper_planner_start(taper_planner_t *planner, const taper_snapshot_t *snapshot, const int32_t *site_limit_W) {

@@ -22,6 +22,7 @@ void taper_limits_apply(taper_limits_t *limits, const taper_site_limit_t *messag
         taper_count(&limits->negative);
     }
     limits->heard = true;
+    limits->alive = true;
     limits->heard_ms = now_ms;
     limits->gateway_W = message->active ? taper_max_i32(message->limit_W, 0) : INT32_MAX;
     const bool shorter = message->validity_s != TAPER_ABSENT && message->validity_s * 1000 < TAPER_SITE_LIMIT_TIMEOUT_ms;
@@ -43,7 +44,7 @@ taper_status_t taper_limits_set_curve(taper_limits_t *limits, const taper_limit_
 }
 
 bool taper_limits_gateway_alive(const taper_limits_t *limits, uint32_t now_ms) {
-    return limits->heard && taper_elapsed_ms(now_ms, limits->heard_ms) <= limits->holds_ms;
+    return limits->alive && taper_elapsed_ms(now_ms, limits->heard_ms) <= limits->holds_ms;
 }
 
 /** Index of the point in force at `time_ms`, or -1 before the first. */
@@ -53,6 +54,18 @@ static int32_t point_at(const taper_limit_curve_t *curve, uint32_t time_ms) {
         at++;
     }
     return at;
+}
+
+void taper_limits_update(taper_limits_t *limits, uint32_t now_ms) {
+    taper_limit_curve_t *curve = &limits->curve;
+    limits->alive = taper_limits_gateway_alive(limits, now_ms);
+    const int32_t at = point_at(curve, now_ms);
+    if (at < 0) {
+        return;
+    }
+    curve->count = (uint16_t)(curve->count - at);
+    memmove(curve->point, curve->point + at, curve->count * sizeof curve->point[0]);
+    curve->point[0].time_ms = now_ms; /* in force since long ago is in force since now */
 }
 
 static int32_t curve_W(const taper_limits_t *limits, int32_t point) {

@@ -43,10 +43,11 @@ typedef struct {
 /** What went wrong outside, and how much was done. Saturating; they never fall. */
 typedef struct {
     uint32_t frames_received, frames_sent, frames_unknown, crc_errors, frames_repeated, frames_lost, bad_fields;
+    uint32_t frames_untrusted; /**< sound, but from a sender with more than two errors in its last five frames */
     uint32_t send_refused;     /**< the port's queue was full */
     uint32_t plans;            /**< solves finished, whatever the verdict */
     uint32_t plans_rejected;   /**< of these, not used */
-    uint32_t fallback_ticks;   /**< ticks in which the policy could not be followed though a limit was known */
+    uint32_t fallback_ticks;   /**< ticks in mode FALLBACK or FAILSAFE */
     uint32_t guard_violations; /**< must stay 0 */
 } taper_station_counters_t;
 

@@ -61,7 +61,8 @@ void taper_planner_start(taper_planner_t *planner, const taper_snapshot_t *snaps
 /**
  * Work one slice of at most `iterations` on the present problem, rounded down to a multiple of TAPER_MIN_SLICE but at
  * least that. The steps taken, and so the answer, do not depend on how a solve is sliced.
- * @return the verdict; TAPER_VERDICT_SOLVING: call again. Cost: `iterations` x cost of an iteration (docs/results.md).
+ * @return the verdict; TAPER_VERDICT_SOLVING: call again. Cost: `iterations` x cost of an iteration
+ * (docs/results.md), and a factorisation for every 50 of them.
  */
 taper_verdict_t taper_planner_run(taper_planner_t *planner, uint16_t iterations);
 
@@ -77,7 +78,7 @@ int32_t taper_planner_power_W(const taper_planner_t *planner, uint8_t i, uint8_t
 /** The same before rounding, in units of `horizon.base_W`. */
 taper_real_t taper_planner_power(const taper_planner_t *planner, uint8_t i, uint8_t t);
 
-/** Iterations spent on the last problem. */
+/** Iterations spent so far on the present problem. */
 uint16_t taper_planner_iterations(const taper_planner_t *planner);
 
 #endif

@@ -26,8 +26,9 @@ typedef struct {
     const taper_station_config_t *config;
     taper_limit_curve_t curve;
     bool heard;            /**< any SITE_LIMIT with a limit, ever */
+    bool alive;            /**< the last one still holds, by the last update */
     uint32_t heard_ms;     /**< when the last one came */
-    uint32_t holds_ms;     /**< how long it counts */
+    uint32_t holds_ms;     /**< how long it holds */
     int32_t gateway_W;     /**< what it said, >= 0; INT32_MAX: no limit in force */
     int32_t failsafe_W;    /**< >= 0 */
     uint32_t negative;     /**< limits below zero, taken as zero */
@@ -41,13 +42,22 @@ typedef struct {
 /** No gateway heard, no curve known. `config` must outlive it. */
 void taper_limits_init(taper_limits_t *limits, const taper_station_config_t *config);
 
-/** Take in a SITE_LIMIT. One without a limit (absent) is a heartbeat only and changes nothing. */
+/**
+ * Take in a SITE_LIMIT. It holds for its validity, but no longer than TAPER_SITE_LIMIT_TIMEOUT_ms. One without a limit
+ * (absent) is a heartbeat only and changes nothing.
+ */
 void taper_limits_apply(taper_limits_t *limits, const taper_site_limit_t *message, uint32_t now_ms);
 
 /** Replace the known course. @return TAPER_ERR_ARGUMENT, and nothing changed, for a curve that is out of order. */
 taper_status_t taper_limits_set_curve(taper_limits_t *limits, const taper_limit_curve_t *curve);
 
-/** Whether a limit of the gateway is in force. */
+/**
+ * Forget a limit of the gateway that ran out, and the points of the curve that are past. Call it once per control tick,
+ * after the frames: old times must not come round again with the clock. Cost: O(points).
+ */
+void taper_limits_update(taper_limits_t *limits, uint32_t now_ms);
+
+/** Whether a limit of the gateway is in force at `now_ms`. */
 bool taper_limits_gateway_alive(const taper_limits_t *limits, uint32_t now_ms);
 
 /** The limit at `now_ms`. Cost: O(points). */

@@ -53,7 +53,7 @@ typedef struct {
     int32_t validity_s;  /**< 0..254, or absent */
 } taper_site_limit_t;
 
-/** SETPOINT, controller to connector, 500 ms and on change. */
+/** SETPOINT, controller to connector, every control tick. */
 typedef struct {
     taper_command_t command;
     int32_t current_mA;  /**< 0..6 553 400 */
@@ -106,10 +106,10 @@ typedef struct {
 /** CTRL_STATUS, controller to all, 1 s. */
 typedef struct {
     uint8_t mode;           /**< taper_mode_t */
-    uint8_t verdict;        /**< taper_verdict_t of the last plan */
+    uint8_t verdict;        /**< taper_verdict_t of the last plan, or of the one in work */
     uint8_t limit_source;   /**< taper_limit_source_t of the limit in force */
-    uint8_t solve_ticks;    /**< control ticks that the last plan took */
-    uint16_t iterations;    /**< of the last plan, 0..510 in steps of 2 */
+    uint8_t solve_ticks;    /**< control ticks that it took so far */
+    uint16_t iterations;    /**< of it so far, 0..510 in steps of 2 */
     uint8_t active;         /**< vehicles that want energy */
     uint8_t waiting;        /**< of these, without current */
     uint8_t plan_version;   /**< counts plans */
