@@ -59,7 +59,8 @@ static const struct argp_option options[] = {
     {"min-current-a", KEY_MINIMUM, "X", 0,
      "Least current per phase [A] of every connector; 0: any (default: the station's own)", 0},
     {"seed", KEY_SEED, "N", 0, "Decides in which order nodes send; no result depends on it (default: 0)", 0},
-    {"problems", KEY_PROBLEMS, "FILE", 0, "Write every planning problem to this file (input of planner_probe)", 0},
+    {"problems", KEY_PROBLEMS, "FILE", 0,
+     "Write every planning problem to this file (input of planner_probe)", 0},
     {"out", KEY_OUT, "DIR", 0, "Write the results to this directory (default: only print a summary)", 0},
     {0},
 };

@@ -19,8 +19,8 @@ enum {
 /** Strings are borrowed from the command line. */
 typedef struct {
     const char *sessions_file;
-    const char *limit_file; /**< NULL: none */
-    const char *out;        /**< NULL: no files */
+    const char *limit_file;    /**< NULL: none */
+    const char *out;           /**< NULL: no files */
     const char *problems_file; /**< NULL: none */
     const sim_policy_t *policy;
     unsigned station;     /**< index in taper_stations[] */

@@ -16,9 +16,9 @@ void sim_problems_add(FILE *file, const taper_station_t *station) {
     for (unsigned i = 0; i < snapshot->count; i++) {
         const taper_demand_t *d = &snapshot->demand[i];
         if (d->active) {
-            fprintf(file, "demand %u %u %ld %ld %ld %ld %ld %ld %ld %ld\n", i, (unsigned)d->session, (long)d->stored_Wh,
-                    (long)d->capacity_Wh, (long)d->need_Wh, (long)d->peak_W, (long)d->taper_W, (long)d->max_mA,
-                    (long)d->W_per_A, (long)d->departs_in_s);
+            fprintf(file, "demand %u %u %ld %ld %ld %ld %ld %ld %ld %ld\n", i, (unsigned)d->session,
+                    (long)d->stored_Wh, (long)d->capacity_Wh, (long)d->need_Wh, (long)d->peak_W,
+                    (long)d->taper_W, (long)d->max_mA, (long)d->W_per_A, (long)d->departs_in_s);
         }
     }
     fprintf(file, "solve\n");

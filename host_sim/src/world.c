@@ -7,8 +7,8 @@
 #include "fleet.h"
 #include "gateway.h"
 #include "memory.h"
-#include "progress.h"
 #include "problems.h"
+#include "progress.h"
 #include "queue.h"
 
 /** Power above a limit by less than this is rounding of doubles [kW]. */
@@ -137,7 +137,8 @@ static void note_solve(world_t *world) {
     world->plans = station->counters.plans;
     sim_samples_add(&world->results->iterations, taper_planner_iterations(&station->planner));
     sim_samples_add(&world->results->solve_ms, station->last_solve_us / 1000.0);
-    if (world->run->problems != NULL && station->plan_made_ms == station->snapshot.now_ms) { // else: older snapshot
+    if (world->run->problems != NULL &&
+        station->plan_made_ms == station->snapshot.now_ms) { // else: older snapshot
         sim_problems_add(world->run->problems, station);
     }
 }

@@ -61,8 +61,8 @@ static void read_demand(const char *line) {
     int i = 0;
     unsigned session = 0;
     taper_demand_t d = {.active = true};
-    if (sscanf(line, "demand %d %u %d %d %d %d %d %d %d %d", &i, &session, &d.stored_Wh, &d.capacity_Wh, &d.need_Wh,
-               &d.peak_W, &d.taper_W, &d.max_mA, &d.W_per_A, &d.departs_in_s) != 10 ||
+    if (sscanf(line, "demand %d %u %d %d %d %d %d %d %d %d", &i, &session, &d.stored_Wh, &d.capacity_Wh,
+               &d.need_Wh, &d.peak_W, &d.taper_W, &d.max_mA, &d.W_per_A, &d.departs_in_s) != 10 ||
         i < 0 || i >= config->connector_count) {
         fail(line);
     }

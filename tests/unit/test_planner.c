@@ -167,8 +167,8 @@ static void test_values_that_are_not_finite_are_seen_and_forgotten(void) {
 }
 
 static void test_a_solver_of_another_station_is_refused(void) {
-    TEST_ASSERT_EQUAL(TAPER_ERR_CONFIG,
-                      taper_planner_init(&planner, taper_solvers[index_of("garage")], taper_stations[index_of("hub")]));
+    TEST_ASSERT_EQUAL(TAPER_ERR_CONFIG, taper_planner_init(&planner, taper_solvers[index_of("garage")],
+                                                           taper_stations[index_of("hub")]));
 }
 
 int main(void) {

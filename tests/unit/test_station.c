@@ -8,7 +8,7 @@
 #include "taper/stations.h"
 #include "unity.h"
 #if TAPER_TEST_WITH_PLANNER
-#include "taper/solvers.h"
+#    include "taper/solvers.h"
 #endif
 
 static taper_station_t station;
@@ -29,7 +29,8 @@ static unsigned hub_index(void) {
 }
 
 static taper_station_options_t options(void) {
-    taper_station_options_t with = {.config = taper_stations[hub_index()], .port = &port, .iterations_per_tick = 500};
+    taper_station_options_t with = {
+        .config = taper_stations[hub_index()], .port = &port, .iterations_per_tick = 500};
 #if TAPER_TEST_WITH_PLANNER
     with.solver = taper_solvers[hub_index()];
 #endif
@@ -86,8 +87,11 @@ static void send_vehicle(uint8_t node, uint8_t session, int32_t soc_permille) {
                                                  .soc_plug_in_permille = soc_permille};
     send(&message);
     message.kind = TAPER_MESSAGE_EV_PARAM_B;
-    message.as.ev_param_b = (taper_ev_param_b_t){
-        .revision = session, .session = session, .departure_min = 10000 + 120, .peak_W = 11000, .min_mA = TAPER_ABSENT};
+    message.as.ev_param_b = (taper_ev_param_b_t){.revision = session,
+                                                 .session = session,
+                                                 .departure_min = 10000 + 120,
+                                                 .peak_W = 11000,
+                                                 .min_mA = TAPER_ABSENT};
     send(&message);
     message.kind = TAPER_MESSAGE_EV_PARAM_C;
     message.as.ev_param_c = (taper_ev_param_c_t){
@@ -166,12 +170,14 @@ static void test_a_soc_frame_in_gives_a_setpoint_frame_out_through_every_hop(voi
 #if TAPER_TEST_WITH_PLANNER
     TEST_ASSERT_EQUAL(TAPER_VERDICT_SOLVED, station.planner.verdict);
     TEST_ASSERT_EQUAL(TAPER_MODE_PLAN, taper_station_mode(&station));
-    TEST_ASSERT_INT32_WITHIN(80, 8000, station.plan_W[0]); /* 11 kW - half of 6 kW, within the solver's tolerance */
+    TEST_ASSERT_INT32_WITHIN(80, 8000,
+                             station.plan_W[0]); /* 11 kW - half of 6 kW, within the solver's tolerance */
 #else
     TEST_ASSERT_EQUAL(TAPER_MODE_FALLBACK, taper_station_mode(&station));
 #endif
     TEST_ASSERT_EQUAL_INT32(8000, station.proposal.ceiling_W[0]);
-    TEST_ASSERT_EQUAL_INT32(11600, station.setpoints.current_mA[0]); /* 8000 W / 690 V = 11.594 A, up to the step */
+    TEST_ASSERT_EQUAL_INT32(11600,
+                            station.setpoints.current_mA[0]); /* 8000 W / 690 V = 11.594 A, up to the step */
 
     const taper_setpoint_t setpoint = setpoint_for(1);
     TEST_ASSERT_EQUAL(TAPER_COMMAND_CHARGE, setpoint.command);

@@ -8,7 +8,7 @@ typedef struct {
     const taper_snapshot_t *snapshot;
     const taper_proposal_t *proposal;
     const taper_allocator_t *allocator; /* the switches' history */
-    int64_t room_mW[TAPER_MAX_GROUPS]; /* never negative */
+    int64_t room_mW[TAPER_MAX_GROUPS];  /* never negative */
     int32_t *current_mA;
 } round_t;
 
@@ -28,14 +28,16 @@ static void open_rooms(round_t *round, int32_t site_limit_W) {
 
 static int64_t least_room_mW(const round_t *round, uint8_t i) {
     int64_t least = INT64_MAX;
-    for (uint8_t k = round->config->connectors[i].group; k != TAPER_NO_GROUP; k = round->config->groups[k].parent) {
+    for (uint8_t k = round->config->connectors[i].group; k != TAPER_NO_GROUP;
+         k = round->config->groups[k].parent) {
         least = round->room_mW[k] < least ? round->room_mW[k] : least;
     }
     return least;
 }
 
 static void take_room(round_t *round, uint8_t i, int64_t power_mW) {
-    for (uint8_t k = round->config->connectors[i].group; k != TAPER_NO_GROUP; k = round->config->groups[k].parent) {
+    for (uint8_t k = round->config->connectors[i].group; k != TAPER_NO_GROUP;
+         k = round->config->groups[k].parent) {
         round->room_mW[k] -= power_mW;
     }
 }
@@ -80,7 +82,8 @@ static bool held(const taper_switch_t *state, bool on, uint32_t now_ms, uint32_t
 /** Current to start from for a wish: with a minimum, a wish below it becomes the minimum or nothing. */
 static int32_t wished_mA(const round_t *round, uint8_t i) {
     const taper_demand_t *demand = &round->snapshot->demand[i];
-    const int32_t wish_mA = current_of_mA(demand, (int64_t)taper_max_i32(round->proposal->wish_W[i], 0) * 1000);
+    const int32_t wish_mA =
+        current_of_mA(demand, (int64_t)taper_max_i32(round->proposal->wish_W[i], 0) * 1000);
     if (wish_mA >= demand->min_mA) {
         return wish_mA;
     }
@@ -112,7 +115,8 @@ static bool may_have_current(const round_t *round, uint8_t i) {
     if (i >= round->snapshot->count || !round->snapshot->demand[i].active) {
         return false;
     }
-    const bool kept_off = held(switch_of(round, i), false, round->snapshot->now_ms, round->config->min_off_ms);
+    const bool kept_off =
+        held(switch_of(round, i), false, round->snapshot->now_ms, round->config->min_off_ms);
     return round->snapshot->demand[i].min_mA == 0 || !kept_off;
 }
 
@@ -151,6 +155,7 @@ void taper_allocate(taper_allocator_t *allocator, const taper_station_config_t *
     raise_all(&round, ceiling_mA);
     raise_all(&round, ceiling_rounded_up_mA);
     for (uint8_t i = 0; i < snapshot->count; i++) {
-        note_switch(&allocator->state[i], &snapshot->demand[i], setpoints->current_mA[i] > 0, snapshot->now_ms);
+        note_switch(&allocator->state[i], &snapshot->demand[i], setpoints->current_mA[i] > 0,
+                    snapshot->now_ms);
     }
 }

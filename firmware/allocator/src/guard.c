@@ -6,12 +6,13 @@ static bool connector_passes(const taper_connector_config_t *connector, const ta
     if (current_mA == 0) {
         return true;
     }
-    return demand->active && current_mA > 0 && current_mA <= connector->max_mA && current_mA <= demand->max_mA &&
-           current_mA >= demand->min_mA && current_mA % TAPER_CURRENT_STEP_mA == 0;
+    return demand->active && current_mA > 0 && current_mA <= connector->max_mA &&
+           current_mA <= demand->max_mA && current_mA >= demand->min_mA &&
+           current_mA % TAPER_CURRENT_STEP_mA == 0;
 }
 
-bool taper_guard_passes(const taper_station_config_t *config, const taper_snapshot_t *snapshot, int32_t site_limit_W,
-                        const taper_setpoints_t *setpoints) {
+bool taper_guard_passes(const taper_station_config_t *config, const taper_snapshot_t *snapshot,
+                        int32_t site_limit_W, const taper_setpoints_t *setpoints) {
     int64_t sum_mW[TAPER_MAX_GROUPS] = {0};
     for (uint8_t i = 0; i < config->connector_count; i++) {
         const int32_t current_mA = setpoints->current_mA[i];

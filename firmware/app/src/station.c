@@ -87,7 +87,8 @@ static void plan(taper_station_t *station, int32_t site_limit_W) {
         }
         start_plan(station, site_limit_W);
     }
-    const taper_verdict_t verdict = taper_planner_run(&station->planner, station->options.iterations_per_tick);
+    const taper_verdict_t verdict =
+        taper_planner_run(&station->planner, station->options.iterations_per_tick);
     station->solve_us += clock_us(station) - began_us;
     if (verdict != TAPER_VERDICT_SOLVING) {
         keep_plan(station);
@@ -96,7 +97,8 @@ static void plan(taper_station_t *station, int32_t site_limit_W) {
 
 static bool plan_is_usable(const taper_station_t *station) {
     const uint32_t lasts_ms = station->options.config->step_s * UINT32_C(1000) * PLAN_LASTS_STEPS;
-    return station->plan_usable && taper_elapsed_ms(station->snapshot.now_ms, station->plan_made_ms) < lasts_ms;
+    return station->plan_usable &&
+           taper_elapsed_ms(station->snapshot.now_ms, station->plan_made_ms) < lasts_ms;
 }
 
 /**
@@ -142,7 +144,8 @@ static taper_mode_t decide_mode(taper_station_t *station) {
 static void allocate(taper_station_t *station, taper_mode_t mode, int32_t site_limit_W) {
     const taper_station_config_t *config = station->options.config;
     const int32_t limit_W = mode == TAPER_MODE_INIT ? 0 : site_limit_W;
-    taper_allocate(&station->allocator, config, &station->snapshot, &station->proposal, limit_W, &station->setpoints);
+    taper_allocate(&station->allocator, config, &station->snapshot, &station->proposal, limit_W,
+                   &station->setpoints);
     if (!taper_guard_passes(config, &station->snapshot, limit_W, &station->setpoints)) {
         taper_count(&station->counters.guard_violations);
         memset(&station->setpoints, 0, sizeof station->setpoints);

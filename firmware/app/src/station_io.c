@@ -7,29 +7,21 @@
 
 /** Least validity of a setpoint, and how many control ticks it must outlive. */
 #define VALIDITY_FLOOR_ms 3000u
-#define VALIDITY_TICKS 3u
+#define VALIDITY_TICKS    3u
 /** Longest that SETPOINT can say. */
 #define VALIDITY_MOST_ms 127000u
 
 /** Place of a connector's message kind among its end-to-end receivers, or -1. */
 static int receiver_place(unsigned function) {
     switch (function) {
-    case TAPER_MESSAGE_EVSE_STATUS:
-        return 0;
-    case TAPER_MESSAGE_EV_STATUS:
-        return 1;
-    case TAPER_MESSAGE_EVSE_ELEC:
-        return 2;
-    case TAPER_MESSAGE_EV_PARAM_A:
-        return 3;
-    case TAPER_MESSAGE_EV_PARAM_B:
-        return 4;
-    case TAPER_MESSAGE_EV_PARAM_C:
-        return 5;
-    case TAPER_MESSAGE_EV_PARAM_D:
-        return 6;
-    default:
-        return -1;
+    case TAPER_MESSAGE_EVSE_STATUS: return 0;
+    case TAPER_MESSAGE_EV_STATUS: return 1;
+    case TAPER_MESSAGE_EVSE_ELEC: return 2;
+    case TAPER_MESSAGE_EV_PARAM_A: return 3;
+    case TAPER_MESSAGE_EV_PARAM_B: return 4;
+    case TAPER_MESSAGE_EV_PARAM_C: return 5;
+    case TAPER_MESSAGE_EV_PARAM_D: return 6;
+    default: return -1;
     }
 }
 
@@ -48,23 +40,15 @@ static taper_e2e_receiver_t *receiver_of(taper_station_t *station, const taper_f
     return place < 0 || connector < 0 ? NULL : &station->connector_e2e[connector][place];
 }
 
-static bool is_good(taper_station_counters_t *counters, taper_e2e_receiver_t *receiver, const taper_frame_t *frame) {
+static bool is_good(taper_station_counters_t *counters, taper_e2e_receiver_t *receiver,
+                    const taper_frame_t *frame) {
     switch (taper_e2e_check(receiver, frame)) {
-    case TAPER_E2E_OK:
-        break;
-    case TAPER_E2E_OK_SOME_LOST:
-        taper_count(&counters->frames_lost);
-        break;
-    case TAPER_E2E_REPEATED:
-        taper_count(&counters->frames_repeated);
-        return false;
-    case TAPER_E2E_WRONG_SEQUENCE:
-        taper_count(&counters->frames_lost);
-        return false;
+    case TAPER_E2E_OK: break;
+    case TAPER_E2E_OK_SOME_LOST: taper_count(&counters->frames_lost); break;
+    case TAPER_E2E_REPEATED: taper_count(&counters->frames_repeated); return false;
+    case TAPER_E2E_WRONG_SEQUENCE: taper_count(&counters->frames_lost); return false;
     case TAPER_E2E_CRC_ERROR:
-    default:
-        taper_count(&counters->crc_errors);
-        return false;
+    default: taper_count(&counters->crc_errors); return false;
     }
     if (!taper_e2e_is_valid(receiver)) {
         taper_count(&counters->frames_untrusted);
@@ -102,7 +86,8 @@ static void take_frame(taper_station_t *station, const taper_frame_t *frame, uin
 void taper_station_receive(taper_station_t *station, uint32_t now_ms) {
     const taper_port_t *port = station->options.port;
     taper_frame_t frame;
-    for (uint32_t taken = 0; taken < TAPER_MAX_FRAMES_PER_STEP && port->receive(port->context, &frame); taken++) {
+    for (uint32_t taken = 0; taken < TAPER_MAX_FRAMES_PER_STEP && port->receive(port->context, &frame);
+         taken++) {
         take_frame(station, &frame, now_ms);
     }
 }
@@ -114,11 +99,13 @@ static void send_message(taper_station_t *station, const taper_message_t *messag
         return;
     }
     taper_e2e_protect(&frame, counter);
-    taper_count(port->send(port->context, &frame) ? &station->counters.frames_sent : &station->counters.send_refused);
+    taper_count(port->send(port->context, &frame) ? &station->counters.frames_sent
+                                                  : &station->counters.send_refused);
 }
 
 static int32_t validity_ms(const taper_station_config_t *config) {
-    uint32_t validity = config->tick_ms < VALIDITY_MOST_ms ? config->tick_ms * VALIDITY_TICKS : VALIDITY_MOST_ms;
+    uint32_t validity =
+        config->tick_ms < VALIDITY_MOST_ms ? config->tick_ms * VALIDITY_TICKS : VALIDITY_MOST_ms;
     validity = validity < VALIDITY_FLOOR_ms ? VALIDITY_FLOOR_ms : validity;
     return (int32_t)(validity > VALIDITY_MOST_ms ? VALIDITY_MOST_ms : validity);
 }
@@ -156,7 +143,8 @@ static taper_ctrl_status_t status_of(const taper_station_t *station) {
     for (uint8_t i = 0; i < station->snapshot.count; i++) {
         const bool active = station->snapshot.demand[i].active;
         status.active = (uint8_t)(status.active + (active ? 1 : 0));
-        status.waiting = (uint8_t)(status.waiting + (active && station->setpoints.current_mA[i] == 0 ? 1 : 0));
+        status.waiting =
+            (uint8_t)(status.waiting + (active && station->setpoints.current_mA[i] == 0 ? 1 : 0));
     }
     return status;
 }

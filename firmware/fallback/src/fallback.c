@@ -14,7 +14,8 @@ static void rank_ascending(const int32_t *key, uint8_t count, uint8_t *rank) {
     }
 }
 
-static void wish_all_that_is_useful(const taper_snapshot_t *snapshot, uint32_t tick_ms, taper_proposal_t *proposal) {
+static void wish_all_that_is_useful(const taper_snapshot_t *snapshot, uint32_t tick_ms,
+                                    taper_proposal_t *proposal) {
     for (uint8_t i = 0; i < snapshot->count; i++) {
         const int32_t useful_W = taper_battery_useful_W(&snapshot->demand[i], tick_ms);
         proposal->wish_W[i] = useful_W;

@@ -6,11 +6,11 @@
 
 /** What one connector brings into the problem, per unit. */
 typedef struct {
-    taper_real_t rate;      /* limit of connector and vehicle */
-    taper_real_t taper;     /* limit at the present SOC */
-    taper_real_t slope;     /* a_i per step */
-    taper_real_t need;      /* energy */
-    taper_real_t weight;    /* w_i */
+    taper_real_t rate;   /* limit of connector and vehicle */
+    taper_real_t taper;  /* limit at the present SOC */
+    taper_real_t slope;  /* a_i per step */
+    taper_real_t need;   /* energy */
+    taper_real_t weight; /* w_i */
     int32_t departs_in_s;
 } chain_t;
 
@@ -51,7 +51,8 @@ static taper_real_t strongest_connector_W(const taper_station_config_t *config) 
     int64_t strongest_mW = 1;
     for (uint8_t i = 0; i < config->connector_count; i++) {
         const taper_connector_config_t *connector = &config->connectors[i];
-        const int64_t power_mW = (int64_t)connector->max_mA * connector->voltage_mV / 1000 * connector->phases;
+        const int64_t power_mW =
+            (int64_t)connector->max_mA * connector->voltage_mV / 1000 * connector->phases;
         strongest_mW = power_mW > strongest_mW ? power_mW : strongest_mW;
     }
     return (taper_real_t)strongest_mW / 1000;
@@ -72,7 +73,8 @@ static taper_real_t allowed_W(const taper_demand_t *demand) {
 
 /** Steps that a vehicle could wait and still be served: its stay less the time its need takes at the present limit. */
 static taper_real_t laxity_steps(const taper_demand_t *demand, uint16_t step_s) {
-    const taper_real_t limit_W = taper_real_min(allowed_W(demand), (taper_real_t)taper_battery_limit_W(demand));
+    const taper_real_t limit_W =
+        taper_real_min(allowed_W(demand), (taper_real_t)taper_battery_limit_W(demand));
     const taper_real_t charging_s = limit_W > 0 ? (taper_real_t)demand->need_Wh * 3600 / limit_W : 0;
     return taper_real_max((taper_real_t)demand->departs_in_s - charging_s, 0) / (taper_real_t)step_s;
 }
@@ -84,7 +86,8 @@ static taper_real_t laxity_steps(const taper_demand_t *demand, uint16_t step_s) 
  */
 static taper_real_t urgency(const taper_demand_t *demand, uint16_t step_s) {
     const int32_t steps = demand->departs_in_s / step_s;
-    return 1 + (taper_real_t)2 / (taper_real_t)taper_max_i32(steps, 1) + 1 / (laxity_steps(demand, step_s) + 4);
+    return 1 + (taper_real_t)2 / (taper_real_t)taper_max_i32(steps, 1) +
+           1 / (laxity_steps(demand, step_s) + 4);
 }
 
 static chain_t chain_of(const taper_horizon_t *horizon, const taper_demand_t *demand) {
@@ -94,7 +97,8 @@ static chain_t chain_of(const taper_horizon_t *horizon, const taper_demand_t *de
     return (chain_t){
         .rate = allowed_W(demand) / horizon->base_W,
         .taper = (taper_real_t)taper_battery_limit_W(demand) / horizon->base_W,
-        .slope = slope < 1 ? slope : 1, /* a battery that fills within one step: the taper row then bounds v(i,t) */
+        .slope = slope < 1 ? slope
+                           : 1, /* a battery that fills within one step: the taper row then bounds v(i,t) */
         .need = (taper_real_t)demand->need_Wh / (horizon->base_W * step_h),
         .weight = urgency(demand, step_s),
         .departs_in_s = demand->departs_in_s,
@@ -117,7 +121,8 @@ static void write_idle(taper_horizon_t *horizon, uint8_t i) {
     horizon->taper_keep[i] = 1;
 }
 
-static void write_chain(taper_horizon_t *horizon, uint8_t i, const chain_t *chain, const int32_t *site_limit_W) {
+static void write_chain(taper_horizon_t *horizon, uint8_t i, const chain_t *chain,
+                        const int32_t *site_limit_W) {
     const uint8_t steps = horizon->config->steps;
     const unsigned taper_row = (unsigned)horizon->config->connector_count * steps + i * (steps - 1U);
     taper_real_t worth = chain->weight * TAPER_DISCOUNT; /* of a unit of energy in step t */
@@ -128,7 +133,8 @@ static void write_chain(taper_horizon_t *horizon, uint8_t i, const chain_t *chai
         horizon->linear[v] = next - worth;
         worth = next;
         horizon->lower[v] = 0;
-        horizon->upper[v] = taper_real_min(chain->rate * there, (taper_real_t)site_limit_W[t] / horizon->base_W);
+        horizon->upper[v] =
+            taper_real_min(chain->rate * there, (taper_real_t)site_limit_W[t] / horizon->base_W);
         if (t == 0) {
             horizon->upper[v] = taper_real_min(horizon->upper[v], chain->taper);
             continue;

@@ -7,7 +7,8 @@
 #include "project.h"
 #include "solver.h"
 
-_Static_assert(sizeof(OSQPFloat) == sizeof(taper_real_t), "solver and firmware are built for the same real type");
+_Static_assert(sizeof(OSQPFloat) == sizeof(taper_real_t),
+               "solver and firmware are built for the same real type");
 
 /**
  * Absolute and relative tolerance. In double, cost and constraints come well within 1e-3 of the optimum on every problem
@@ -23,10 +24,11 @@ _Static_assert(sizeof(OSQPFloat) == sizeof(taper_real_t), "solver and firmware a
 /** Least penalty, and that of a fresh solver: below it the primal residual stands still. */
 #define LEAST_RHO ((OSQPFloat)0.3)
 /** The penalty is looked at again after every so many iterations, and changed if it is this factor off. */
-#define RHO_INTERVAL 50
+#define RHO_INTERVAL  50
 #define RHO_TOLERANCE ((OSQPFloat)2)
 
-_Static_assert(TAPER_MIN_SLICE <= RHO_INTERVAL && RHO_INTERVAL % TAPER_MIN_SLICE == 0, "slices end where OSQP looks");
+_Static_assert(TAPER_MIN_SLICE <= RHO_INTERVAL && RHO_INTERVAL % TAPER_MIN_SLICE == 0,
+               "slices end where OSQP looks");
 _Static_assert(TAPER_MAX_ITERATIONS % RHO_INTERVAL == 0, "the budget is a number of intervals");
 
 static bool solver_fits(const taper_solver_t *solver, const taper_station_config_t *config) {
@@ -146,7 +148,8 @@ static uint8_t steps_since(const taper_planner_t *planner, uint32_t now_ms) {
     return elapsed < most ? (uint8_t)elapsed : most;
 }
 
-void taper_planner_start(taper_planner_t *planner, const taper_snapshot_t *snapshot, const int32_t *site_limit_W) {
+void taper_planner_start(taper_planner_t *planner, const taper_snapshot_t *snapshot,
+                         const int32_t *site_limit_W) {
     taper_horizon_t *horizon = &planner->horizon;
     const uint8_t shift = steps_since(planner, snapshot->now_ms);
     if (!taper_planner_is_usable(planner->verdict) && planner->verdict != TAPER_VERDICT_NONE) {

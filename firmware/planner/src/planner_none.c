@@ -11,7 +11,8 @@ taper_status_t taper_planner_init(taper_planner_t *planner, const taper_solver_t
     return TAPER_OK;
 }
 
-void taper_planner_start(taper_planner_t *planner, const taper_snapshot_t *snapshot, const int32_t *site_limit_W) {
+void taper_planner_start(taper_planner_t *planner, const taper_snapshot_t *snapshot,
+                         const int32_t *site_limit_W) {
     (void)planner;
     (void)snapshot;
     (void)site_limit_W;

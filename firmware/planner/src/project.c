@@ -18,13 +18,15 @@ static projection_t projection_of(const taper_horizon_t *horizon) {
 }
 
 /** Power that connector i may have in step t after `charged` energy. */
-static taper_real_t allowed_power(const projection_t *projection, uint8_t i, uint8_t t, taper_real_t charged) {
+static taper_real_t allowed_power(const projection_t *projection, uint8_t i, uint8_t t,
+                                  taper_real_t charged) {
     const taper_horizon_t *horizon = projection->horizon;
     const uint8_t steps = horizon->config->steps;
     taper_real_t allowed = horizon->upper[(unsigned)i * steps + t];
     if (t > 0) {
         const taper_real_t slope = 1 - horizon->taper_keep[i];
-        allowed = taper_real_min(allowed, projection->taper_upper[(unsigned)i * (steps - 1U) + t - 1] - slope * charged);
+        allowed = taper_real_min(allowed, projection->taper_upper[(unsigned)i * (steps - 1U) + t - 1] -
+                                              slope * charged);
     }
     allowed = taper_real_min(allowed, projection->target_upper[i] / TAPER_TARGET_SCALE - charged);
     return taper_real_max(allowed, 0);
@@ -44,7 +46,8 @@ static void shrink_group(projection_t *projection, uint8_t k, uint8_t t) {
     if (members == 0) {
         return;
     }
-    const taper_real_t limit = projection->sum_upper[(unsigned)k * config->steps + t] / taper_horizon_sum_scale(members);
+    const taper_real_t limit =
+        projection->sum_upper[(unsigned)k * config->steps + t] / taper_horizon_sum_scale(members);
     if (sum <= limit) {
         return;
     }
@@ -62,8 +65,10 @@ void taper_project(const taper_horizon_t *horizon, OSQPFloat *x) {
     taper_real_t charged[TAPER_MAX_CONNECTORS] = {0}; /* up to the last projected step */
     for (uint8_t t = 0; t < steps; t++) {
         for (uint8_t i = 0; i < config->connector_count; i++) {
-            const taper_real_t wanted = x[(unsigned)i * steps + t] - charged[i]; /* makes up for what was cut off */
-            projection.power[i] = taper_real_min(taper_real_max(wanted, 0), allowed_power(&projection, i, t, charged[i]));
+            const taper_real_t wanted =
+                x[(unsigned)i * steps + t] - charged[i]; /* makes up for what was cut off */
+            projection.power[i] =
+                taper_real_min(taper_real_max(wanted, 0), allowed_power(&projection, i, t, charged[i]));
         }
         for (uint8_t k = 0; k < config->group_count; k++) {
             shrink_group(&projection, k, t);

@@ -25,7 +25,8 @@ void taper_limits_apply(taper_limits_t *limits, const taper_site_limit_t *messag
     limits->alive = true;
     limits->heard_ms = now_ms;
     limits->gateway_W = message->active ? taper_max_i32(message->limit_W, 0) : INT32_MAX;
-    const bool shorter = message->validity_s != TAPER_ABSENT && message->validity_s * 1000 < TAPER_SITE_LIMIT_TIMEOUT_ms;
+    const bool shorter =
+        message->validity_s != TAPER_ABSENT && message->validity_s * 1000 < TAPER_SITE_LIMIT_TIMEOUT_ms;
     limits->holds_ms = shorter ? (uint32_t)message->validity_s * 1000 : TAPER_SITE_LIMIT_TIMEOUT_ms;
 }
 
@@ -34,7 +35,8 @@ taper_status_t taper_limits_set_curve(taper_limits_t *limits, const taper_limit_
         return TAPER_ERR_ARGUMENT;
     }
     for (uint16_t k = 0; k < curve->count; k++) {
-        const bool ascending = k == 0 || !taper_time_reached(curve->point[k - 1].time_ms, curve->point[k].time_ms);
+        const bool ascending =
+            k == 0 || !taper_time_reached(curve->point[k - 1].time_ms, curve->point[k].time_ms);
         if (curve->point[k].limit_W < 0 || !ascending) {
             return TAPER_ERR_ARGUMENT;
         }

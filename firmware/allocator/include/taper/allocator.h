@@ -39,7 +39,7 @@ void taper_allocate(taper_allocator_t *allocator, const taper_station_config_t *
                     taper_setpoints_t *setpoints);
 
 /** Whether `setpoints` hold every limit of connectors and groups, recomputed from nothing. Cost: O(connectors x depth). */
-bool taper_guard_passes(const taper_station_config_t *config, const taper_snapshot_t *snapshot, int32_t site_limit_W,
-                        const taper_setpoints_t *setpoints);
+bool taper_guard_passes(const taper_station_config_t *config, const taper_snapshot_t *snapshot,
+                        int32_t site_limit_W, const taper_setpoints_t *setpoints);
 
 #endif

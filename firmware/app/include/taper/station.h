@@ -28,7 +28,8 @@
 
 /** A policy that takes the planner's place: what the allocator gets in mode PLAN. */
 typedef struct {
-    void (*propose)(void *context, const taper_snapshot_t *snapshot, int32_t site_limit_W, taper_proposal_t *proposal);
+    void (*propose)(void *context, const taper_snapshot_t *snapshot, int32_t site_limit_W,
+                    taper_proposal_t *proposal);
     void *context;
 } taper_policy_t;
 
@@ -37,15 +38,18 @@ typedef struct {
     const taper_port_t *port;
     const taper_solver_t *solver; /**< generated for this station; NULL: no planner, charge by fallback */
     const taper_policy_t *policy; /**< NULL: the planner */
-    uint16_t iterations_per_tick; /**< solver iterations in one control tick, >= 10; see taper_planner_run() */
+    uint16_t
+        iterations_per_tick; /**< solver iterations in one control tick, >= 10; see taper_planner_run() */
 } taper_station_options_t;
 
 /** What went wrong outside, and how much was done. Saturating; they never fall. */
 typedef struct {
-    uint32_t frames_received, frames_sent, frames_unknown, crc_errors, frames_repeated, frames_lost, bad_fields;
-    uint32_t frames_untrusted; /**< sound, but from a sender with more than two errors in its last five frames */
-    uint32_t send_refused;     /**< the port's queue was full */
-    uint32_t plans;            /**< solves finished, whatever the verdict */
+    uint32_t frames_received, frames_sent, frames_unknown, crc_errors, frames_repeated, frames_lost,
+        bad_fields;
+    uint32_t
+        frames_untrusted;  /**< sound, but from a sender with more than two errors in its last five frames */
+    uint32_t send_refused; /**< the port's queue was full */
+    uint32_t plans;        /**< solves finished, whatever the verdict */
     uint32_t plans_rejected;   /**< of these, not used */
     uint32_t fallback_ticks;   /**< ticks in mode FALLBACK or FAILSAFE */
     uint32_t guard_violations; /**< must stay 0 */
@@ -66,9 +70,9 @@ typedef struct {
     uint8_t plan_session[TAPER_MAX_CONNECTORS]; /**< whom it was made for */
     uint32_t plan_made_ms;
     bool plan_usable;
-    int32_t planned_limit_W;    /**< site limit and table revision of the last problem */
+    int32_t planned_limit_W; /**< site limit and table revision of the last problem */
     uint32_t planned_revision;
-    uint32_t solve_us;          /**< spent on the present problem */
+    uint32_t solve_us;           /**< spent on the present problem */
     taper_limit_now_t limit_now; /**< of the last step */
     taper_snapshot_t snapshot;   /**< of the last step */
     taper_proposal_t proposal;   /**< of the last step */

@@ -33,13 +33,13 @@
 #define TAPER_TARGET_SCALE ((taper_real_t)0.58)
 
 #define TAPER_MAX_VARIABLES (TAPER_MAX_CONNECTORS * TAPER_MAX_STEPS)
-#define TAPER_MAX_ROWS (2 * TAPER_MAX_VARIABLES + TAPER_MAX_GROUPS * TAPER_MAX_STEPS)
+#define TAPER_MAX_ROWS      (2 * TAPER_MAX_VARIABLES + TAPER_MAX_GROUPS * TAPER_MAX_STEPS)
 
 typedef struct {
     const taper_station_config_t *config;
-    taper_real_t base_W;                           /**< power unit */
-    taper_real_t linear[TAPER_MAX_VARIABLES];      /**< linear cost */
-    taper_real_t lower[TAPER_MAX_ROWS];            /**< row bounds; +-TAPER_REAL_UNBOUNDED: none */
+    taper_real_t base_W;                      /**< power unit */
+    taper_real_t linear[TAPER_MAX_VARIABLES]; /**< linear cost */
+    taper_real_t lower[TAPER_MAX_ROWS];       /**< row bounds; +-TAPER_REAL_UNBOUNDED: none */
     taper_real_t upper[TAPER_MAX_ROWS];
     taper_real_t taper_keep[TAPER_MAX_CONNECTORS]; /**< 1 - a_i: taper row (i,t) is v(i,t) - keep v(i,t-1) */
 } taper_horizon_t;

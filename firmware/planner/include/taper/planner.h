@@ -34,13 +34,13 @@ typedef enum {
 
 typedef struct {
     const taper_solver_t *solver;
-    taper_horizon_t horizon;               /**< the problem being solved */
+    taper_horizon_t horizon; /**< the problem being solved */
     taper_verdict_t verdict;
-    uint16_t iterations;                   /**< spent on the present problem */
-    uint8_t slices;                        /**< of the present problem */
-    uint32_t started_ms;                   /**< time of the snapshot that the problem is for */
-    uint8_t session[TAPER_MAX_CONNECTORS]; /**< whose trajectory the warm start holds; 0: nobody's */
-    bool matrix_is_current;                /**< the solver holds the taper values of `horizon` */
+    uint16_t iterations;                     /**< spent on the present problem */
+    uint8_t slices;                          /**< of the present problem */
+    uint32_t started_ms;                     /**< time of the snapshot that the problem is for */
+    uint8_t session[TAPER_MAX_CONNECTORS];   /**< whose trajectory the warm start holds; 0: nobody's */
+    bool matrix_is_current;                  /**< the solver holds the taper values of `horizon` */
     taper_real_t keep[TAPER_MAX_CONNECTORS]; /**< the taper values that it holds */
 } taper_planner_t;
 
@@ -56,7 +56,8 @@ taper_status_t taper_planner_init(taper_planner_t *planner, const taper_solver_t
  * State a new problem; one that was under way is dropped. The last answer, moved on in time, is the starting point.
  * `site_limit_W` as in taper_horizon_build(). Cost: O(rows), and one or two factorisations.
  */
-void taper_planner_start(taper_planner_t *planner, const taper_snapshot_t *snapshot, const int32_t *site_limit_W);
+void taper_planner_start(taper_planner_t *planner, const taper_snapshot_t *snapshot,
+                         const int32_t *site_limit_W);
 
 /**
  * Work one slice of at most `iterations` on the present problem, rounded down to a multiple of TAPER_MIN_SLICE but at

@@ -25,13 +25,13 @@ typedef enum {
 typedef struct {
     const taper_station_config_t *config;
     taper_limit_curve_t curve;
-    bool heard;            /**< any SITE_LIMIT with a limit, ever */
-    bool alive;            /**< the last one still holds, by the last update */
-    uint32_t heard_ms;     /**< when the last one came */
-    uint32_t holds_ms;     /**< how long it holds */
-    int32_t gateway_W;     /**< what it said, >= 0; INT32_MAX: no limit in force */
-    int32_t failsafe_W;    /**< >= 0 */
-    uint32_t negative;     /**< limits below zero, taken as zero */
+    bool heard;         /**< any SITE_LIMIT with a limit, ever */
+    bool alive;         /**< the last one still holds, by the last update */
+    uint32_t heard_ms;  /**< when the last one came */
+    uint32_t holds_ms;  /**< how long it holds */
+    int32_t gateway_W;  /**< what it said, >= 0; INT32_MAX: no limit in force */
+    int32_t failsafe_W; /**< >= 0 */
+    uint32_t negative;  /**< limits below zero, taken as zero */
 } taper_limits_t;
 
 typedef struct {

@@ -8,8 +8,8 @@
 #define TAPER_FRAME_LENGTH 8
 
 typedef struct {
-    uint16_t id;   /**< 11-bit identifier: function << 6 | node */
-    uint8_t bus;   /**< which of the station's CAN buses */
+    uint16_t id;    /**< 11-bit identifier: function << 6 | node */
+    uint8_t bus;    /**< which of the station's CAN buses */
     uint8_t length; /**< data length code, 0..8 */
     uint8_t data[TAPER_FRAME_LENGTH];
 } taper_frame_t;

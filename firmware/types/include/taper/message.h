@@ -26,7 +26,7 @@ typedef enum {
 } taper_message_kind_t;
 
 #define TAPER_NODE_CONTROLLER 0
-#define TAPER_NODE_GATEWAY 62
+#define TAPER_NODE_GATEWAY    62
 
 /** Control-pilot states of IEC 61851-1, as EVSE_STATUS carries them. */
 typedef enum {
@@ -47,10 +47,10 @@ typedef enum {
 
 /** SITE_LIMIT, gateway to controller, 1 s; the gateway's heartbeat. */
 typedef struct {
-    bool active;         /**< the limit below is in force */
-    int32_t limit_W;     /**< -3 276 700..3 276 700, or absent */
-    int32_t failsafe_W;  /**< likewise */
-    int32_t validity_s;  /**< 0..254, or absent */
+    bool active;        /**< the limit below is in force */
+    int32_t limit_W;    /**< -3 276 700..3 276 700, or absent */
+    int32_t failsafe_W; /**< likewise */
+    int32_t validity_s; /**< 0..254, or absent */
 } taper_site_limit_t;
 
 /** SETPOINT, controller to connector, every control tick. */
@@ -79,11 +79,11 @@ typedef struct {
 
 /** EV_STATUS, connector to controller, 500 ms. */
 typedef struct {
-    uint8_t error;          /**< 0: none */
-    int32_t soc_permille;   /**< 0..1000 in steps of 5, or absent */
-    int32_t soc_age_s;      /**< 0..254, or absent */
-    int32_t max_mA;         /**< 0..6 553 400, the vehicle's own limit, or absent */
-    bool complete;          /**< the vehicle has what it wanted */
+    uint8_t error;        /**< 0: none */
+    int32_t soc_permille; /**< 0..1000 in steps of 5, or absent */
+    int32_t soc_age_s;    /**< 0..254, or absent */
+    int32_t max_mA;       /**< 0..6 553 400, the vehicle's own limit, or absent */
+    bool complete;        /**< the vehicle has what it wanted */
     bool ready;
     bool pause_requested;
     bool stop_requested;
@@ -105,14 +105,14 @@ typedef struct {
 
 /** CTRL_STATUS, controller to all, 1 s. */
 typedef struct {
-    uint8_t mode;           /**< taper_mode_t */
-    uint8_t verdict;        /**< taper_verdict_t of the last plan, or of the one in work */
-    uint8_t limit_source;   /**< taper_limit_source_t of the limit in force */
-    uint8_t solve_ticks;    /**< control ticks that it took so far */
-    uint16_t iterations;    /**< of it so far, 0..510 in steps of 2 */
-    uint8_t active;         /**< vehicles that want energy */
-    uint8_t waiting;        /**< of these, without current */
-    uint8_t plan_version;   /**< counts plans */
+    uint8_t mode;         /**< taper_mode_t */
+    uint8_t verdict;      /**< taper_verdict_t of the last plan, or of the one in work */
+    uint8_t limit_source; /**< taper_limit_source_t of the limit in force */
+    uint8_t solve_ticks;  /**< control ticks that it took so far */
+    uint16_t iterations;  /**< of it so far, 0..510 in steps of 2 */
+    uint8_t active;       /**< vehicles that want energy */
+    uint8_t waiting;      /**< of these, without current */
+    uint8_t plan_version; /**< counts plans */
 } taper_ctrl_status_t;
 
 /** EV_PARAM_A, connector to controller, 2 s and on change. */
