@@ -111,7 +111,7 @@ class Problem:
         now_W = max(demand.peak_W - fall_per_Wh * demand.stored_Wh, 0.0)
         steps_left = int(demand.departs_in_s / step_s)
         charging_s = demand.need_Wh * 3600 / min(now_W, connector_W) if now_W > 0 else 0.0
-        weight = 1 + 2 / max(steps_left, 1) + 1 / (max(demand.departs_in_s - charging_s, 0) / step_s + 4)
+        weight = 1 + 8 / max(steps_left, 1) + 3 / (max(demand.departs_in_s - charging_s, 0) / step_s + 16)
         for t in range(self.station.steps):
             u, x, before = self._u(chain, t), self._x(chain, t), self._x(chain, t - 1)
             self.quadratic[u] = DISCOUNT ** (t + 1) * CURVATURE

@@ -109,7 +109,7 @@ static void test_the_linear_cost_is_the_worth_of_power_step_by_step(void) {
     snapshot.demand[0].departs_in_s = 8 * 900;
     snapshot.demand[0].need_Wh = 7360; /* an hour: 4 of the 8 steps to spare */
     build();
-    const double weight = 1 + 2.0 / 8 + 1.0 / (4 + 4);
+    const double weight = 1 + 8.0 / 8 + 3.0 / (4 + 16);
     assert_near(-weight * (0.95 - 0.95 * 0.95), horizon.linear[RATE(0, 0)]);
     assert_near(-weight * pow(0.95, STEPS), horizon.linear[RATE(0, STEPS - 1)]);
 }

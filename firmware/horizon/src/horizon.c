@@ -86,8 +86,8 @@ static taper_real_t laxity_steps(const taper_demand_t *demand, uint16_t step_s) 
  */
 static taper_real_t urgency(const taper_demand_t *demand, uint16_t step_s) {
     const int32_t steps = demand->departs_in_s / step_s;
-    return 1 + (taper_real_t)2 / (taper_real_t)taper_max_i32(steps, 1) +
-           1 / (laxity_steps(demand, step_s) + 4);
+    return 1 + (taper_real_t)8 / (taper_real_t)taper_max_i32(steps, 1) +
+           3 / (laxity_steps(demand, step_s) + 16);
 }
 
 static chain_t chain_of(const taper_horizon_t *horizon, const taper_demand_t *demand) {

@@ -1,5 +1,7 @@
 #include "project.h"
 
+#include <stddef.h>
+
 /** Where the row blocks of one problem begin. */
 typedef struct {
     const taper_horizon_t *horizon;
@@ -8,8 +10,8 @@ typedef struct {
 } projection_t;
 
 static projection_t projection_of(const taper_horizon_t *horizon) {
-    const unsigned connectors = horizon->config->connector_count;
-    const unsigned steps = horizon->config->steps;
+    const size_t connectors = horizon->config->connector_count;
+    const size_t steps = horizon->config->steps;
     projection_t projection = {.horizon = horizon};
     projection.taper_upper = horizon->upper + connectors * steps;
     projection.target_upper = projection.taper_upper + connectors * (steps - 1);

@@ -90,14 +90,18 @@ taper_limit_now_t taper_limits_now(const taper_limits_t *limits, uint32_t now_ms
 /** Mean of the curve over [from_ms, from_ms + length_ms), starting the search at `*point`, which moves along. */
 static int32_t mean_W(const taper_limits_t *limits, uint32_t from_ms, uint32_t length_ms, int32_t *point) {
     const taper_limit_curve_t *curve = &limits->curve;
+    if (length_ms == 0) {
+        return curve_W(limits, *point);
+    }
     int64_t sum = 0;
     uint32_t done_ms = 0;
     while (done_ms < length_ms) {
         uint32_t until_ms = length_ms;
-        const bool changes = *point + 1 < curve->count &&
-                             !taper_time_reached(curve->point[*point + 1].time_ms, from_ms + length_ms);
+        const uint32_t next = (uint32_t)(*point + 1);
+        const bool changes =
+            next < curve->count && !taper_time_reached(curve->point[next].time_ms, from_ms + length_ms);
         if (changes) {
-            until_ms = curve->point[*point + 1].time_ms - from_ms;
+            until_ms = curve->point[next].time_ms - from_ms;
         }
         sum += (int64_t)curve_W(limits, *point) * (until_ms - done_ms);
         done_ms = until_ms;

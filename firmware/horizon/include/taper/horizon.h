@@ -6,7 +6,7 @@
  * from now to the end of step t = 0..T-1, so that its power is u(i,t) = v(i,t) - v(i,t-1), v(i,-1) = 0.
  *
  *     minimise  sum_t g^(t+1) sum_i [ q/2 u(i,t)^2 - w_i u(i,t) ]        g = TAPER_DISCOUNT, q = TAPER_CURVATURE,
- *               w_i = 1 + 2 / max(whole steps to departure, 1) + 1 / (laxity in steps + 4)
+ *               w_i = 1 + 8 / max(whole steps to departure, 1) + 3 / (laxity in steps + 16)
  *     rate      0 <= u(i,t) <= rate limit, 0 outside the stay            (paper, eq. 1 and 3)
  *     taper     u(i,t) + a_i v(i,t-1) <= limit at the present SOC        (paper, eq. 5; at t = 0 part of rate)
  *     target    v(i,T-1) <= need
