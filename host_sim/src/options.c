@@ -61,7 +61,8 @@ static const struct argp_option options[] = {
     {"seed", KEY_SEED, "N", 0, "Decides in which order nodes send; no result depends on it (default: 0)", 0},
     {"problems", KEY_PROBLEMS, "FILE", 0,
      "Write every planning problem to this file (input of planner_probe)", 0},
-    {"out", KEY_OUT, "DIR", 0, "Write the results to this directory (default: only print a summary)", 0},
+    {"out", KEY_OUT, "DIR", 0,
+     "Write the results to this directory, made if missing (default: only print a summary)", 0},
     {0},
 };
 

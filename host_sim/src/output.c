@@ -47,10 +47,15 @@ static bool is_directory(const char *name) {
     return true;
 }
 
-static bool parent_is_writable(const char *directory) {
+/** Whether `directory` and its missing parents could be made: what is there of its path ends in one to write to. */
+static bool can_be_made(const char *directory) {
     char *copy = sim_copy(directory);
-    const char *parent = dirname(copy);
-    const bool good = is_directory(parent) && access(parent, W_OK | X_OK) == 0;
+    const char *there = dirname(copy);
+    struct stat info;
+    while (lstat(there, &info) != 0 && errno == ENOENT) { // ends at "." or "/"
+        there = dirname(copy);
+    }
+    const bool good = is_directory(there) && access(there, W_OK | X_OK) == 0;
     const int error = errno;
     free(copy);
     errno = error;
@@ -67,7 +72,7 @@ bool sim_output_check(const char *directory) {
     if (errno != ENOENT) {
         return fail(directory, "cannot be an output directory", errno);
     }
-    return parent_is_writable(directory) || fail(directory, "cannot be made", errno);
+    return can_be_made(directory) || fail(directory, "cannot be made", errno);
 }
 
 static bool write_file(const char *name, const sim_output_t *file) {
@@ -108,6 +113,37 @@ static bool move(const char *made, const char *directory, const sim_output_t *fi
     return good;
 }
 
+/** Make the missing directories above `place`; `made[i]` becomes true for each that ends before the slash at `i`. */
+static bool make_parents(const char *place, bool *made) {
+    char *name = sim_copy(place);
+    const size_t length = strlen(name);
+    bool good = true;
+    for (size_t i = 1; i < length && good; i++) {
+        if (name[i] == '/') {
+            name[i] = '\0';
+            made[i] = mkdir(name, 0777) == 0;
+            good = made[i] || errno == EEXIST;
+            name[i] = '/';
+        }
+    }
+    const int error = errno;
+    free(name);
+    errno = error;
+    return good;
+}
+
+/** Remove those again that make_parents() made. */
+static void remove_parents(const char *place, const bool *made) {
+    char *name = sim_copy(place);
+    for (size_t i = strlen(name); i-- > 0;) {
+        if (made[i]) {
+            name[i] = '\0';
+            (void)rmdir(name);
+        }
+    }
+    free(name);
+}
+
 /** Remove what is left of the directory that was written to. */
 static void clean_up(const char *made, const sim_output_t *file, size_t count) {
     for (size_t i = 0; i < count; i++) {
@@ -138,10 +174,9 @@ static sigset_t hold_signals(void) {
     return before;
 }
 
-bool sim_output_write(const char *directory, const sim_output_t *file, size_t count) {
-    char *place = without_slashes(directory);
+/** Write to a new directory beside `place`, and put it there. */
+static bool write_beside(const char *place, const sim_output_t *file, size_t count) {
     char *made = join(place, ".part-", "XXXXXX");
-    const sigset_t before = hold_signals();
     bool good = mkdtemp(made) != NULL;
     if (good) {
         good = usual_rights(made) && write_all(made, file, count) && move(made, place, file, count);
@@ -149,11 +184,24 @@ bool sim_output_write(const char *directory, const sim_output_t *file, size_t co
         clean_up(made, file, count);
         errno = error;
     }
+    const int error = errno;
+    free(made);
+    errno = error;
+    return good;
+}
+
+bool sim_output_write(const char *directory, const sim_output_t *file, size_t count) {
+    char *place = without_slashes(directory);
+    bool *parents = sim_allocate(strlen(place) + 1, sizeof *parents);
+    const sigset_t before = hold_signals();
+    const bool good = make_parents(place, parents) && write_beside(place, file, count);
     if (!good) {
-        (void)fail(directory, "cannot be written to", errno);
+        const int error = errno;
+        remove_parents(place, parents);
+        (void)fail(directory, "cannot be written to", error);
     }
     (void)sigprocmask(SIG_SETMASK, &before, NULL);
-    free(made);
+    free(parents);
     free(place);
     return good;
 }

@@ -67,6 +67,20 @@ static bool read_positive(const row_t *row, int column, double high, double *val
     return true;
 }
 
+/** Read digits, and nothing after them but `.0`: pandas writes whole numbers so where a column has empty fields. */
+static bool parse_whole(const char *text, unsigned *value) {
+    const size_t digits = strspn(text, "0123456789");
+    const char *rest = text + digits;
+    const bool whole =
+        rest[0] == '\0' || (rest[0] == '.' && rest[1] == '0' && rest[1 + strspn(rest + 1, "0")] == '\0');
+    // Six digits cannot overflow, and no station has as many connectors.
+    if (digits < 1 || digits > 6 || !whole) {
+        return false;
+    }
+    *value = (unsigned)strtoul(text, NULL, 10);
+    return true;
+}
+
 static bool read_connector(const row_t *row, unsigned *connector) {
     const size_t column = row->index[COLUMN_CONNECTOR];
     const char *cell = sim_table_cell(row->table, row->row, column);
@@ -74,12 +88,10 @@ static bool read_connector(const row_t *row, unsigned *connector) {
     if (cell[0] == '\0') {
         return true;
     }
-    // Six digits cannot overflow, and no station has as many connectors.
-    if (strspn(cell, "0123456789") != strlen(cell) || strlen(cell) > 6) {
+    if (!parse_whole(cell, connector)) {
         return sim_table_error(row->table, row->row, column, "unknown connector '%s', the station has 1..%u",
                                cell, row->connectors);
     }
-    *connector = (unsigned)strtoul(cell, NULL, 10);
     if (*connector < 1 || *connector > row->connectors) {
         return sim_table_error(row->table, row->row, column, "unknown connector %s, the station has 1..%u",
                                cell, row->connectors);

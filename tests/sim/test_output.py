@@ -115,8 +115,8 @@ def test_a_new_folder_is_made_and_nothing_else(sim, out):
 
 @pytest.mark.parametrize(
     ("out", "reason"),
-    [("sessions.csv", "cannot be an output directory"), ("missing/out", "cannot be made"),
-     ("sessions.csv/out", "cannot be an output directory"), ("", "cannot be an output directory")],
+    [("sessions.csv", "cannot be an output directory"), ("sessions.csv/out", "cannot be an output directory"),
+     ("sessions.csv/missing/out", "cannot be an output directory"), ("", "cannot be an output directory")],
 )
 def test_an_impossible_folder_is_told_before_the_run(sim, out, reason):
     run = sim.run(ROWS, out=out)
@@ -124,6 +124,37 @@ def test_an_impossible_folder_is_told_before_the_run(sim, out, reason):
     assert reason in run.stderr
     assert run.stdout == ""
     assert sim.files() == ["sessions.csv"]
+
+
+@pytest.mark.parametrize("out", ["a/b/c", "./a//b/c/", "here/../a/b/c"])
+def test_missing_parents_are_made(sim, out):
+    (sim.folder / "here").mkdir()
+    assert sim.run(ROWS, out=out).code == 0
+    assert sorted(path.name for path in (sim.folder / "a/b/c").iterdir()) == FILES
+    assert sim.files() == sorted(["a", "a/b", "a/b/c", *(f"a/b/c/{name}" for name in FILES), "here", "sessions.csv"])
+
+
+def test_parents_are_not_made_for_bad_input(sim):
+    assert sim.run("nonsense\n", out="a/b/c").code == 1
+    assert sim.files() == ["sessions.csv"]
+
+
+def test_a_link_to_nowhere_is_told_before_the_run(sim):
+    (sim.folder / "link").symlink_to("nowhere")
+    run = sim.run(ROWS, out="link/missing/out")
+    assert run.code == 1
+    assert "cannot be made" in run.stderr
+    assert run.stdout == ""
+    assert sim.files() == ["link", "sessions.csv"]
+
+
+def test_parents_that_were_made_go_when_writing_fails(sim):
+    """The name itself fits; that of the directory that is written to does not."""
+    (sim.folder / "here").mkdir()
+    run = sim.run(ROWS, out="here/a/b/" + 250 * "x")
+    assert run.code == 1
+    assert "cannot be written to" in run.stderr
+    assert sim.files() == ["here", "sessions.csv"]
 
 
 def test_a_folder_that_gets_in_the_way_of_a_file_is_an_error(sim):

@@ -22,7 +22,12 @@ def with_value(column, value):
         ("connector", "0", "unknown connector 0"),
         ("connector", "-1", "unknown connector '-1'"),
         ("connector", "A1", "unknown connector 'A1'"),
-        ("connector", "1.0", "unknown connector '1.0'"),
+        ("connector", "1.5", "unknown connector '1.5'"),
+        ("connector", "1.", "unknown connector '1.'"),
+        ("connector", "1.0x", "unknown connector '1.0x'"),
+        ("connector", ".0", "unknown connector '.0'"),
+        ("connector", "0.0", "unknown connector 0.0"),
+        ("connector", "9.0", "unknown connector 9.0, the station has 1..8"),
         ("connector", "99999999999999999999", "unknown connector"),
         ("arrival_s", "noon", "not a number: 'noon'"),
         ("arrival_s", "", "empty, a number is needed"),
@@ -141,6 +146,12 @@ def test_every_usual_form_of_csv_is_read(sim, text):
     assert run.code == 0, run.stderr
     assert run.stderr == ""
     assert run.sessions["a"]["satisfied"] == "1"
+
+
+def test_a_connector_may_be_written_as_pandas_does_beside_empty_fields(sim):
+    run = sim.run([session("a", connector="3.0"), session("b", connector="2.000"), session("c")])
+    assert run.code == 0, run.stderr
+    assert [row["connector"] for row in run.sessions.values()] == ["3", "2", "1"]
 
 
 def test_the_line_is_right_with_crlf(sim):

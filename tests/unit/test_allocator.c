@@ -48,7 +48,7 @@ static void test_a_feeder_limit_binds_its_own_connectors_only(void) {
     const taper_proposal_t proposal = scene_proposal(7360);
     allocate(scene_four(), &snapshot, &proposal, 25000);
     TEST_ASSERT_EQUAL_INT32(32000, setpoints.current_mA[0]);
-    TEST_ASSERT_EQUAL_INT32(20100, setpoints.current_mA[1]); /* 12 kW - 7.36 kW = 20.17 A */
+    TEST_ASSERT_EQUAL_INT32(20000, setpoints.current_mA[1]); /* 11.96 kW - 7.36 kW */
     TEST_ASSERT_EQUAL_INT32(32000, setpoints.current_mA[2]);
 }
 
@@ -60,6 +60,44 @@ static void test_the_rank_decides_who_is_served(void) {
     allocate(scene_four(), &snapshot, &proposal, 8000);
     TEST_ASSERT_EQUAL_INT32(32000, setpoints.current_mA[3]);
     TEST_ASSERT_EQUAL_INT32(0, setpoints.current_mA[0]); /* 640 W left: below 6 A */
+}
+
+static void test_all_wishes_come_before_any_ceiling(void) {
+    const taper_snapshot_t snapshot = scene_snapshot(0, 2);
+    taper_proposal_t proposal = scene_proposal(2990);
+    proposal.ceiling_W[0] = 7360;
+    proposal.ceiling_W[1] = 7360;
+    allocate(scene_four(), &snapshot, &proposal, 6210);
+    TEST_ASSERT_EQUAL_INT32(14000, setpoints.current_mA[0]); /* 13 A wished, and the 230 W left over */
+    TEST_ASSERT_EQUAL_INT32(13000, setpoints.current_mA[1]);
+}
+
+static void test_a_negative_wish_is_no_wish(void) {
+    const taper_snapshot_t snapshot = scene_snapshot(0, 2);
+    taper_proposal_t proposal = scene_proposal(2990);
+    proposal.wish_W[0] = -5000;
+    proposal.ceiling_W[0] = -1;
+    allocate(scene_four(), &snapshot, &proposal, 25000);
+    TEST_ASSERT_EQUAL_INT32(0, setpoints.current_mA[0]);
+    TEST_ASSERT_EQUAL_INT32(13000, setpoints.current_mA[1]);
+}
+
+static void test_from_half_its_minimum_on_a_wish_is_served_as_the_minimum(void) {
+    const taper_snapshot_t snapshot = scene_snapshot(0, 2);
+    taper_proposal_t proposal = scene_proposal(1380); /* 6 A */
+    proposal.wish_W[0] = 690;
+    allocate(scene_four(), &snapshot, &proposal, 1380);
+    TEST_ASSERT_EQUAL_INT32(6000, setpoints.current_mA[0]);
+    TEST_ASSERT_EQUAL_INT32(0, setpoints.current_mA[1]);
+}
+
+static void test_below_half_its_minimum_a_wish_waits_for_what_is_left_over(void) {
+    const taper_snapshot_t snapshot = scene_snapshot(0, 2);
+    taper_proposal_t proposal = scene_proposal(1380);
+    proposal.wish_W[0] = 689;
+    allocate(scene_four(), &snapshot, &proposal, 1380);
+    TEST_ASSERT_EQUAL_INT32(0, setpoints.current_mA[0]);
+    TEST_ASSERT_EQUAL_INT32(6000, setpoints.current_mA[1]);
 }
 
 static void test_what_is_left_over_goes_up_to_the_ceilings(void) {
@@ -191,8 +229,8 @@ static void vary_demands(taper_snapshot_t *snapshot, uint32_t *state) {
 static void assert_limits_hold(const taper_snapshot_t *snapshot, int32_t site_limit_W) {
     const int64_t site_mW = (int64_t)taper_clamp_i32(site_limit_W, 0, 25000) * 1000;
     TEST_ASSERT_LESS_OR_EQUAL_INT64(site_mW, power_mW(snapshot, 0, 3));
-    TEST_ASSERT_LESS_OR_EQUAL_INT64(12000000, power_mW(snapshot, 0, 1));
-    TEST_ASSERT_LESS_OR_EQUAL_INT64(12000000, power_mW(snapshot, 2, 3));
+    TEST_ASSERT_LESS_OR_EQUAL_INT64(11960000, power_mW(snapshot, 0, 1));
+    TEST_ASSERT_LESS_OR_EQUAL_INT64(11960000, power_mW(snapshot, 2, 3));
     for (uint8_t i = 0; i < 4; i++) {
         const int32_t current_mA = setpoints.current_mA[i];
         const taper_demand_t *demand = &snapshot->demand[i];
@@ -233,6 +271,8 @@ static void test_the_guard_refuses_every_kind_of_excess(void) {
     } cases[] = {
         {"all within", {26000, 26000, 26000, 0}, 25000, true},
         {"above the feeder", {26100, 26100, 0, 0}, 25000, false},
+        {"exactly the feeder", {26000, 26000, 0, 0}, 25000, true},
+        {"above the site limit of now, across feeders", {26000, 0, 26000, 0}, 11959, false},
         {"above the site limit of now", {26000, 26000, 0, 0}, 11959, false},
         {"exactly the site limit of now", {26000, 26000, 0, 0}, 11960, true},
         {"above the connector", {32100, 0, 0, 0}, 25000, false},
@@ -257,6 +297,10 @@ int main(void) {
     RUN_TEST(test_no_connector_exceeds_its_own_limit);
     RUN_TEST(test_a_feeder_limit_binds_its_own_connectors_only);
     RUN_TEST(test_the_rank_decides_who_is_served);
+    RUN_TEST(test_all_wishes_come_before_any_ceiling);
+    RUN_TEST(test_a_negative_wish_is_no_wish);
+    RUN_TEST(test_from_half_its_minimum_on_a_wish_is_served_as_the_minimum);
+    RUN_TEST(test_below_half_its_minimum_a_wish_waits_for_what_is_left_over);
     RUN_TEST(test_what_is_left_over_goes_up_to_the_ceilings);
     RUN_TEST(test_rounding_wastes_less_than_one_step_in_all);
     RUN_TEST(test_below_its_minimum_a_connector_gets_nothing);

@@ -71,7 +71,7 @@ static void keep_plan(taper_station_t *station) {
     station->plan_made_ms = station->planner.started_ms;
     for (uint8_t i = 0; i < station->snapshot.count; i++) {
         station->plan_W[i] = usable ? taper_planner_power_W(&station->planner, i, 0) : 0;
-        station->plan_session[i] = station->snapshot.demand[i].session;
+        station->plan_session[i] = station->planner.session[i];
     }
 }
 

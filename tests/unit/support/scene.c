@@ -13,8 +13,8 @@
 
 static const taper_group_config_t groups[] = {
     {.limit_W = 25000, .parent = TAPER_NO_GROUP},
-    {.limit_W = 12000, .parent = 0},
-    {.limit_W = 12000, .parent = 0},
+    {.limit_W = 11960, .parent = 0}, /* 52 A */
+    {.limit_W = 11960, .parent = 0}, /* 52 A */
 };
 
 static const taper_connector_config_t connectors[] = {CONNECTOR(0, 1, 6000), CONNECTOR(1, 1, 6000),
