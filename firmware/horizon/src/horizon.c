@@ -32,10 +32,6 @@ taper_real_t taper_horizon_hessian_neighbour(uint8_t t) {
     return -TAPER_CURVATURE * discount_to((unsigned)t + 1);
 }
 
-taper_real_t taper_horizon_sum_scale(uint8_t members) {
-    return (taper_real_t)sqrt((taper_real_t)5 / (taper_real_t)members);
-}
-
 bool taper_group_contains(const taper_station_config_t *config, uint8_t k, uint8_t i) {
     uint8_t group = config->connectors[i].group;
     for (uint8_t depth = 0; depth < config->group_count && group != TAPER_NO_GROUP; depth++) {
@@ -45,6 +41,14 @@ bool taper_group_contains(const taper_station_config_t *config, uint8_t k, uint8
         group = config->groups[group].parent;
     }
     return false;
+}
+
+taper_real_t taper_horizon_sum_scale(const taper_station_config_t *config, uint8_t k) {
+    uint8_t members = 0;
+    for (uint8_t i = 0; i < config->connector_count; i++) {
+        members = (uint8_t)(members + (taper_group_contains(config, k, i) ? 1 : 0));
+    }
+    return members > 0 ? (taper_real_t)sqrt((taper_real_t)5 / (taper_real_t)members) : 0;
 }
 
 static taper_real_t strongest_connector_W(const taper_station_config_t *config) {
@@ -107,9 +111,9 @@ static chain_t chain_of(const taper_horizon_t *horizon, const taper_demand_t *de
 
 static void write_idle(taper_horizon_t *horizon, uint8_t i) {
     const uint8_t steps = horizon->config->steps;
-    const unsigned taper_row = (unsigned)horizon->config->connector_count * steps + i * (steps - 1U);
+    const size_t taper_row = taper_first_taper_row(horizon->config) + (size_t)i * (steps - 1U);
     for (uint8_t t = 0; t < steps; t++) {
-        const unsigned v = (unsigned)i * steps + t;
+        const size_t v = (size_t)i * steps + t;
         horizon->linear[v] = 0;
         horizon->lower[v] = 0;
         horizon->upper[v] = 0;
@@ -124,10 +128,10 @@ static void write_idle(taper_horizon_t *horizon, uint8_t i) {
 static void write_chain(taper_horizon_t *horizon, uint8_t i, const chain_t *chain,
                         const int32_t *site_limit_W) {
     const uint8_t steps = horizon->config->steps;
-    const unsigned taper_row = (unsigned)horizon->config->connector_count * steps + i * (steps - 1U);
+    const size_t taper_row = taper_first_taper_row(horizon->config) + (size_t)i * (steps - 1U);
     taper_real_t worth = chain->weight * TAPER_DISCOUNT; /* of a unit of energy in step t */
     for (uint8_t t = 0; t < steps; t++) {
-        const unsigned v = (unsigned)i * steps + t;
+        const size_t v = (size_t)i * steps + t;
         const taper_real_t next = t + 1 < steps ? worth * TAPER_DISCOUNT : 0;
         const taper_real_t there = presence(chain->departs_in_s, horizon->config->step_s, t);
         horizon->linear[v] = next - worth;
@@ -146,13 +150,9 @@ static void write_chain(taper_horizon_t *horizon, uint8_t i, const chain_t *chai
     horizon->taper_keep[i] = 1 - chain->slope;
 }
 
-static unsigned target_row(const taper_station_config_t *config) {
-    return (unsigned)config->connector_count * (2U * config->steps - 1U);
-}
-
 static void write_connector(taper_horizon_t *horizon, uint8_t i, const taper_demand_t *demand,
                             const int32_t *site_limit_W) {
-    const unsigned target = target_row(horizon->config) + i;
+    const size_t target = taper_first_target_row(horizon->config) + i;
     horizon->lower[target] = -TAPER_REAL_UNBOUNDED;
     horizon->upper[target] = TAPER_REAL_UNBOUNDED;
     if (!demand->active) {
@@ -164,19 +164,10 @@ static void write_connector(taper_horizon_t *horizon, uint8_t i, const taper_dem
     horizon->upper[target] = chain.need * TAPER_TARGET_SCALE;
 }
 
-static uint8_t members_of(const taper_station_config_t *config, uint8_t k) {
-    uint8_t members = 0;
-    for (uint8_t i = 0; i < config->connector_count; i++) {
-        members = (uint8_t)(members + (taper_group_contains(config, k, i) ? 1 : 0));
-    }
-    return members;
-}
-
 static void write_group(taper_horizon_t *horizon, uint8_t k, const int32_t *site_limit_W) {
     const taper_station_config_t *config = horizon->config;
-    const uint8_t members = members_of(config, k);
-    const taper_real_t scale = members > 0 ? taper_horizon_sum_scale(members) / horizon->base_W : 0;
-    const unsigned first = target_row(config) + config->connector_count + (unsigned)k * config->steps;
+    const taper_real_t scale = taper_horizon_sum_scale(config, k) / horizon->base_W;
+    const size_t first = taper_first_sum_row(config) + (size_t)k * config->steps;
     for (uint8_t t = 0; t < config->steps; t++) {
         const int32_t limit_W =
             k == 0 ? taper_min_i32(site_limit_W[t], config->groups[0].limit_W) : config->groups[k].limit_W;

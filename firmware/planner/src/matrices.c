@@ -51,11 +51,7 @@ OSQPInt taper_write_constraints(const taper_solver_t *solver, const taper_statio
                                 const taper_real_t *taper_keep) {
     taper_real_t scale[TAPER_MAX_GROUPS];
     for (uint8_t k = 0; k < config->group_count; k++) {
-        uint8_t members = 0;
-        for (uint8_t i = 0; i < config->connector_count; i++) {
-            members = (uint8_t)(members + (taper_group_contains(config, k, i) ? 1 : 0));
-        }
-        scale[k] = members > 0 ? taper_horizon_sum_scale(members) : 0;
+        scale[k] = taper_horizon_sum_scale(config, k);
     }
     OSQPInt at = 0;
     for (uint8_t i = 0; i < solver->connectors; i++) {

@@ -1,7 +1,5 @@
 #include "project.h"
 
-#include <stddef.h>
-
 /** Where the row blocks of one problem begin. */
 typedef struct {
     const taper_horizon_t *horizon;
@@ -10,13 +8,12 @@ typedef struct {
 } projection_t;
 
 static projection_t projection_of(const taper_horizon_t *horizon) {
-    const size_t connectors = horizon->config->connector_count;
-    const size_t steps = horizon->config->steps;
-    projection_t projection = {.horizon = horizon};
-    projection.taper_upper = horizon->upper + connectors * steps;
-    projection.target_upper = projection.taper_upper + connectors * (steps - 1);
-    projection.sum_upper = projection.target_upper + connectors;
-    return projection;
+    return (projection_t){
+        .horizon = horizon,
+        .taper_upper = horizon->upper + taper_first_taper_row(horizon->config),
+        .target_upper = horizon->upper + taper_first_target_row(horizon->config),
+        .sum_upper = horizon->upper + taper_first_sum_row(horizon->config),
+    };
 }
 
 /** Power that connector i may have in step t after `charged` energy. */
@@ -24,11 +21,11 @@ static taper_real_t allowed_power(const projection_t *projection, uint8_t i, uin
                                   taper_real_t charged) {
     const taper_horizon_t *horizon = projection->horizon;
     const uint8_t steps = horizon->config->steps;
-    taper_real_t allowed = horizon->upper[(unsigned)i * steps + t];
+    taper_real_t allowed = horizon->upper[(size_t)i * steps + t];
     if (t > 0) {
         const taper_real_t slope = 1 - horizon->taper_keep[i];
-        allowed = taper_real_min(allowed, projection->taper_upper[(unsigned)i * (steps - 1U) + t - 1] -
-                                              slope * charged);
+        allowed = taper_real_min(allowed,
+                                 projection->taper_upper[(size_t)i * (steps - 1U) + t - 1] - slope * charged);
     }
     allowed = taper_real_min(allowed, projection->target_upper[i] / TAPER_TARGET_SCALE - charged);
     return taper_real_max(allowed, 0);
@@ -37,19 +34,12 @@ static taper_real_t allowed_power(const projection_t *projection, uint8_t i, uin
 /** Shrink the powers of a group so that their sum keeps its limit in step t. */
 static void shrink_group(projection_t *projection, uint8_t k, uint8_t t) {
     const taper_station_config_t *config = projection->horizon->config;
+    const taper_real_t scale = taper_horizon_sum_scale(config, k);
     taper_real_t sum = 0;
-    uint8_t members = 0;
     for (uint8_t i = 0; i < config->connector_count; i++) {
-        if (taper_group_contains(config, k, i)) {
-            sum += projection->power[i];
-            members++;
-        }
+        sum += taper_group_contains(config, k, i) ? projection->power[i] : 0;
     }
-    if (members == 0) {
-        return;
-    }
-    const taper_real_t limit =
-        projection->sum_upper[(unsigned)k * config->steps + t] / taper_horizon_sum_scale(members);
+    const taper_real_t limit = scale > 0 ? projection->sum_upper[(size_t)k * config->steps + t] / scale : 0;
     if (sum <= limit) {
         return;
     }
@@ -68,7 +58,7 @@ void taper_project(const taper_horizon_t *horizon, OSQPFloat *x) {
     for (uint8_t t = 0; t < steps; t++) {
         for (uint8_t i = 0; i < config->connector_count; i++) {
             const taper_real_t wanted =
-                x[(unsigned)i * steps + t] - charged[i]; /* makes up for what was cut off */
+                x[(size_t)i * steps + t] - charged[i]; /* makes up for what was cut off */
             projection.power[i] =
                 taper_real_min(taper_real_max(wanted, 0), allowed_power(&projection, i, t, charged[i]));
         }
@@ -77,7 +67,7 @@ void taper_project(const taper_horizon_t *horizon, OSQPFloat *x) {
         }
         for (uint8_t i = 0; i < config->connector_count; i++) {
             charged[i] += projection.power[i];
-            x[(unsigned)i * steps + t] = charged[i];
+            x[(size_t)i * steps + t] = charged[i];
         }
     }
 }

@@ -20,6 +20,7 @@
 #ifndef TAPER_HORIZON_H
 #define TAPER_HORIZON_H
 
+#include <stddef.h>
 #include <stdint.h>
 
 #include "taper/real.h"
@@ -57,8 +58,19 @@ taper_real_t taper_horizon_hessian_diagonal(uint8_t steps, uint8_t t);
 /** Quadratic cost on v(i,t-1) v(i,t) (off the diagonal of the Hessian), t >= 1. */
 taper_real_t taper_horizon_hessian_neighbour(uint8_t t);
 
-/** Factor of the sum rows of a group with `members` connectors: sqrt(5 / members). */
-taper_real_t taper_horizon_sum_scale(uint8_t members);
+/** First of the taper, target and sum rows; the rate rows begin at 0. */
+static inline size_t taper_first_taper_row(const taper_station_config_t *config) {
+    return (size_t)config->connector_count * config->steps;
+}
+static inline size_t taper_first_target_row(const taper_station_config_t *config) {
+    return (size_t)config->connector_count * (2U * config->steps - 1U);
+}
+static inline size_t taper_first_sum_row(const taper_station_config_t *config) {
+    return (size_t)config->connector_count * 2U * config->steps;
+}
+
+/** Factor of the sum rows of group `k`: sqrt(5 / connectors in it), 0 for a group without any. */
+taper_real_t taper_horizon_sum_scale(const taper_station_config_t *config, uint8_t k);
 
 /** Whether connector `i` hangs below group `k` of the feeder tree. */
 bool taper_group_contains(const taper_station_config_t *config, uint8_t k, uint8_t i);
