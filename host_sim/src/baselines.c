@@ -19,8 +19,7 @@ static void propose_llf(void *tick_ms, const taper_snapshot_t *snapshot, int32_t
 
 /** Most that a vehicle says it can take, whatever its SOC [W]. */
 static int32_t flat_maximum_W(const taper_demand_t *demand) {
-    const int64_t power_W = (int64_t)demand->max_mA * demand->W_per_A / 1000;
-    return taper_min_i32(taper_saturate_i32(power_W), demand->peak_W);
+    return taper_min_i32(taper_demand_allowed_W(demand), demand->peak_W);
 }
 
 /** Settle those whose flat maximum is within the present share. @return how many were settled. */

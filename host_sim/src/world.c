@@ -30,9 +30,8 @@ typedef struct {
     sim_fleet_t fleet;
     sim_gateway_t gateway;
     sim_queue_t queue;
-    uint64_t random; /**< state of next_random() */
-    uint8_t
-        turn[TAPER_MAX_CONNECTORS + 1]; /**< the order in which nodes send; the last number is the gateway */
+    uint64_t random;                        /**< state of next_random() */
+    uint8_t turn[TAPER_MAX_CONNECTORS + 1]; /**< nodes in the order of sending; the last is the gateway */
     double group_kw[TAPER_MAX_GROUPS];
     uint32_t plans; /**< of the station, seen so far */
 } world_t;

@@ -104,7 +104,9 @@ def sim(tmp_path):
 def has_planner(simulator):
     """Whether the planner was built in."""
     simulator.write("none.csv", csv_text([]))
-    return "has no planner" not in simulator.call("--sessions", "none.csv", "--policy", "soc-mpc").stderr
+    has = "has no planner" not in simulator.call("--sessions", "none.csv", "--policy", "soc-mpc").stderr
+    assert has == (os.environ["TAPER_WITH_PLANNER"] == "ON"), "the program is not what the build was told to make"
+    return has
 
 
 @pytest.fixture

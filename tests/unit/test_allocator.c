@@ -2,6 +2,7 @@
 
 #include "scene.h"
 #include "taper/allocator.h"
+#include "taper/real.h"
 #include "unity.h"
 
 static taper_allocator_t allocator;
@@ -200,6 +201,14 @@ static void test_idle_connectors_get_nothing_whatever_is_proposed(void) {
 static int32_t hostile(uint32_t *state) {
     static const int32_t ends[] = {INT32_MIN, INT32_MAX, -1, 0, 1, INT32_MIN + 1};
     const uint32_t pick = scene_random(state);
+    if (pick % 5 ==
+        4) { /* what a solver gone wrong holds, as it reaches the allocator: NaN, infinite, huge, denormal */
+        uint32_t bits[2] = {scene_random(state),
+                            scene_random(state) | (pick % 2 == 0 ? UINT32_C(0x7FF00000) : 0)};
+        taper_real_t real;
+        memcpy(&real, sizeof real == sizeof bits ? &bits[0] : &bits[1], sizeof real);
+        return taper_real_to_W(real, INT32_MAX);
+    }
     if (pick % 4 == 0) {
         return ends[pick / 4 % (sizeof ends / sizeof ends[0])];
     }

@@ -101,6 +101,8 @@ static void test_a_curve_out_of_order_is_refused_and_the_old_one_stays(void) {
     TEST_ASSERT_EQUAL(TAPER_ERR_ARGUMENT, taper_limits_set_curve(&limits, &curve));
     curve.point[1] = (taper_limit_point_t){2000, -1};
     TEST_ASSERT_EQUAL(TAPER_ERR_ARGUMENT, taper_limits_set_curve(&limits, &curve));
+    curve.point[1] = (taper_limit_point_t){1000 + TAPER_CURVE_SPAN_ms + 1, 10000};
+    TEST_ASSERT_EQUAL(TAPER_ERR_ARGUMENT, taper_limits_set_curve(&limits, &curve));
     curve.count = TAPER_MAX_LIMIT_POINTS + 1;
     TEST_ASSERT_EQUAL(TAPER_ERR_ARGUMENT, taper_limits_set_curve(&limits, &curve));
     gateway_says(25000, 2000);

@@ -166,9 +166,16 @@ static void test_the_minimum_is_rounded_up_to_the_wires_step(void) {
     TEST_ASSERT_EQUAL_INT32(7100, plugged_in()->min_mA);
 }
 
-static void test_where_currents_are_continuous_the_vehicles_minimum_is_ignored(void) {
+static void test_where_the_connector_has_no_minimum_that_of_the_vehicle_holds(void) {
     bench.connector = BENCH_DC;
     bench.b.min_mA = 8000;
+    TEST_ASSERT_TRUE(plugged_in()->active);
+    TEST_ASSERT_EQUAL_INT32(8000, bench_demand(&bench)->min_mA);
+}
+
+static void test_without_any_minimum_currents_are_continuous(void) {
+    bench.connector = BENCH_DC;
+    bench.b.min_mA = TAPER_ABSENT;
     TEST_ASSERT_TRUE(plugged_in()->active);
     TEST_ASSERT_EQUAL_INT32(0, bench_demand(&bench)->min_mA);
 }
@@ -333,7 +340,8 @@ int main(void) {
     RUN_TEST(test_a_vehicle_that_allows_no_current_is_not_active);
     RUN_TEST(test_a_vehicle_raises_the_minimum_but_does_not_lower_it);
     RUN_TEST(test_the_minimum_is_rounded_up_to_the_wires_step);
-    RUN_TEST(test_where_currents_are_continuous_the_vehicles_minimum_is_ignored);
+    RUN_TEST(test_where_the_connector_has_no_minimum_that_of_the_vehicle_holds);
+    RUN_TEST(test_without_any_minimum_currents_are_continuous);
     RUN_TEST(test_a_minimum_above_the_maximum_is_not_active);
     RUN_TEST(test_power_is_booked_at_the_higher_voltage_in_whole_volts);
     RUN_TEST(test_a_measured_voltage_expires);

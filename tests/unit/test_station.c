@@ -8,6 +8,9 @@
 #include "taper/stations.h"
 #include "unity.h"
 #if TAPER_TEST_WITH_PLANNER
+#    include <math.h>
+
+#    include "solver.h"
 #    include "taper/solvers.h"
 #endif
 
@@ -257,6 +260,26 @@ static void test_a_full_send_queue_is_counted_and_nothing_breaks(void) {
     TEST_ASSERT_EQUAL_UINT32(0, station.counters.guard_violations);
 }
 
+static void test_refused_setpoints_leave_no_gap_in_the_counter(void) {
+    taper_frame_t frame;
+    send_all(1, 50000);
+    while (station.counters.send_refused < 20) { /* nobody reads the bus until it is full, and longer */
+        step();
+    }
+    while (taper_membus_world_receive(&bus, &frame)) {
+    }
+    const uint8_t next = station.setpoint_counter[0];
+    step();
+    bool found = false;
+    while (taper_membus_world_receive(&bus, &frame)) {
+        if (frame.id == taper_can_id(TAPER_MESSAGE_SETPOINT, 1)) {
+            TEST_ASSERT_EQUAL_UINT8(next, frame.data[1] & 0x0F);
+            found = true;
+        }
+    }
+    TEST_ASSERT_TRUE(found);
+}
+
 static void test_options_that_make_no_sense_are_refused(void) {
     taper_station_options_t with = options();
     with.port = NULL;
@@ -269,6 +292,25 @@ static void test_options_that_make_no_sense_are_refused(void) {
     with = options();
     with.config = &config;
     TEST_ASSERT_EQUAL(TAPER_ERR_CONFIG, taper_station_init(&station, &with));
+}
+
+static void test_a_description_out_of_range_is_refused_at_boot(void) {
+    taper_connector_config_t connectors[8];
+    const taper_station_config_t good = *options().config;
+    memcpy(connectors, good.connectors, sizeof connectors);
+    taper_station_config_t bad[6] = {good, good, good, good, good, good};
+    bad[0].tick_ms = 0;
+    bad[1].tick_ms = 3600001;
+    bad[2].step_s = 59;
+    bad[3].step_s = 3601;
+    bad[4].failsafe_W = good.groups[0].limit_W + 1;
+    bad[5].connectors = connectors;
+    connectors[7].bus = TAPER_MAX_BUSES;
+    for (size_t k = 0; k < sizeof bad / sizeof bad[0]; k++) {
+        taper_station_options_t with = options();
+        with.config = &bad[k];
+        TEST_ASSERT_EQUAL(TAPER_ERR_CONFIG, taper_station_init(&station, &with));
+    }
 }
 
 static void test_a_feeder_tree_that_is_none_is_refused_at_boot(void) {
@@ -299,20 +341,60 @@ static void test_sliced_planning_charges_by_fallback_until_the_plan_is_there(voi
     TEST_ASSERT_EQUAL_UINT32(1, station.counters.plans);
 }
 
-static void test_a_poisoned_solver_means_fallback_in_the_same_tick_and_recovery(void) {
+/** A NaN in the solver's memory, as a bit flip would leave it. */
+static void poison_solver(void) {
+    static OSQPFloat poisoned[TAPER_MAX_VARIABLES];
+    for (unsigned v = 0; v < TAPER_MAX_VARIABLES; v++) {
+        poisoned[v] = (OSQPFloat)NAN;
+    }
+    TEST_ASSERT_EQUAL(0, osqp_update_data_vec(station.options.solver->osqp, poisoned, NULL, NULL));
+}
+
+/** Bring the station to PLAN, then into a solve that is not finished. */
+static void leave_a_solve_unfinished(void) {
     send_all(8, 30000);
     step();
     TEST_ASSERT_EQUAL(TAPER_MODE_PLAN, taper_station_mode(&station));
-    station.planner.verdict = TAPER_VERDICT_NOT_FINITE; /* as after a solve that went wrong */
-    station.plan_usable = false;
-    station.planned_limit_W = 30000;
-    send_all(8, 30000);
+    station.options.iterations_per_tick = TAPER_MIN_SLICE;
+    send_all(8, 9000); /* an event, far enough from the last problem for many slices */
+    step();
+    TEST_ASSERT_EQUAL(TAPER_VERDICT_SOLVING, station.planner.verdict);
+}
+
+static void test_while_a_renewal_is_in_work_the_plan_is_followed(void) {
+    leave_a_solve_unfinished();
+    TEST_ASSERT_EQUAL(TAPER_MODE_PLAN, taper_station_mode(&station));
+    TEST_ASSERT_EQUAL_UINT32(1, station.counters.plans);
+}
+
+static void test_a_poisoned_solver_means_fallback_in_the_same_tick_and_a_new_try_after_a_minute(void) {
+    leave_a_solve_unfinished();
+    poison_solver();
+    send_all(8, 9000);
+    step();
+    TEST_ASSERT_EQUAL(TAPER_VERDICT_NOT_FINITE, station.planner.verdict);
+    TEST_ASSERT_EQUAL(TAPER_MODE_FALLBACK, taper_station_mode(&station));
+    TEST_ASSERT_EQUAL_UINT32(1, station.counters.plans_rejected);
+    TEST_ASSERT_GREATER_THAN_INT32(0, station.setpoints.current_mA[0]);
+
+    station.options.iterations_per_tick = TAPER_MAX_ITERATIONS;
+    send_all(8, 9000);
+    step(); /* nothing has changed: no new try yet */
+    TEST_ASSERT_EQUAL(TAPER_MODE_FALLBACK, taper_station_mode(&station));
+    now_ms += 60000;
+    send_all(8, 9000);
+    step();
+    TEST_ASSERT_EQUAL(TAPER_MODE_PLAN, taper_station_mode(&station));
+    TEST_ASSERT_EQUAL_UINT32(1, station.counters.plans_rejected);
+    TEST_ASSERT_EQUAL_UINT32(0, station.counters.guard_violations);
+}
+
+static void test_a_plan_ends_after_two_steps_without_a_renewal(void) {
+    leave_a_solve_unfinished();
+    now_ms += 2 * 900000; /* the solve was never given a tick to go on */
+    send_all(8, 9000);
     step();
     TEST_ASSERT_EQUAL(TAPER_MODE_FALLBACK, taper_station_mode(&station));
-    TEST_ASSERT_GREATER_THAN_INT32(0, station.setpoints.current_mA[0]);
-    send_all(8, 29000); /* an event: plan again */
-    step();
-    TEST_ASSERT_EQUAL(TAPER_MODE_PLAN, taper_station_mode(&station));
 }
 #endif
 
@@ -325,11 +407,15 @@ int main(void) {
     RUN_TEST(test_a_silent_connector_loses_its_current_and_the_others_go_on);
     RUN_TEST(test_a_corrupt_frame_is_dropped_and_counted);
     RUN_TEST(test_a_full_send_queue_is_counted_and_nothing_breaks);
+    RUN_TEST(test_refused_setpoints_leave_no_gap_in_the_counter);
     RUN_TEST(test_options_that_make_no_sense_are_refused);
+    RUN_TEST(test_a_description_out_of_range_is_refused_at_boot);
     RUN_TEST(test_a_feeder_tree_that_is_none_is_refused_at_boot);
 #if TAPER_TEST_WITH_PLANNER
     RUN_TEST(test_sliced_planning_charges_by_fallback_until_the_plan_is_there);
-    RUN_TEST(test_a_poisoned_solver_means_fallback_in_the_same_tick_and_recovery);
+    RUN_TEST(test_while_a_renewal_is_in_work_the_plan_is_followed);
+    RUN_TEST(test_a_poisoned_solver_means_fallback_in_the_same_tick_and_a_new_try_after_a_minute);
+    RUN_TEST(test_a_plan_ends_after_two_steps_without_a_renewal);
 #endif
     return UNITY_END();
 }

@@ -5,7 +5,7 @@
 #include "station_io.h"
 #include "taper/config_check.h"
 
-/** A plan that could not be renewed is followed this many steps, then it is no plan. */
+/** A plan is followed this many steps while its renewal is in work. One that could not be renewed ends at once. */
 #define PLAN_LASTS_STEPS 2u
 /** After a plan that was no good, the next try. */
 #define RETRY_ms UINT32_C(60000)
@@ -141,12 +141,11 @@ static taper_mode_t decide_mode(taper_station_t *station) {
 }
 
 /** Setpoints for the proposal; nothing that the guard refuses gets out. */
-static void allocate(taper_station_t *station, taper_mode_t mode, int32_t site_limit_W) {
+static void allocate(taper_station_t *station, int32_t site_limit_W) {
     const taper_station_config_t *config = station->options.config;
-    const int32_t limit_W = mode == TAPER_MODE_INIT ? 0 : site_limit_W;
-    taper_allocate(&station->allocator, config, &station->snapshot, &station->proposal, limit_W,
+    taper_allocate(&station->allocator, config, &station->snapshot, &station->proposal, site_limit_W,
                    &station->setpoints);
-    if (!taper_guard_passes(config, &station->snapshot, limit_W, &station->setpoints)) {
+    if (!taper_guard_passes(config, &station->snapshot, site_limit_W, &station->setpoints)) {
         taper_count(&station->counters.guard_violations);
         memset(&station->setpoints, 0, sizeof station->setpoints);
     }
@@ -160,8 +159,11 @@ void taper_station_step(taper_station_t *station, uint32_t now_ms) {
     station->limit_now = taper_limits_now(&station->limits, now_ms);
     plan(station, station->limit_now.site_W);
     const taper_mode_t mode = decide_mode(station);
+    if (mode == TAPER_MODE_INIT) {
+        station->limit_now.site_W = 0;
+    }
     propose(station, mode, station->limit_now.site_W);
-    allocate(station, mode, station->limit_now.site_W);
+    allocate(station, station->limit_now.site_W);
     taper_station_send(station);
     if (station->options.port->kick_watchdog != NULL) {
         station->options.port->kick_watchdog(station->options.port->context);

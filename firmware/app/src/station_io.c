@@ -92,15 +92,21 @@ void taper_station_receive(taper_station_t *station, uint32_t now_ms) {
     }
 }
 
-static void send_message(taper_station_t *station, const taper_message_t *message, uint8_t counter) {
+/** @return whether the port took it: a frame that was never sent must leave no gap in the counter. */
+static bool send_message(taper_station_t *station, const taper_message_t *message, uint8_t counter) {
     const taper_port_t *port = station->options.port;
     taper_frame_t frame;
     if (!taper_encode(message, &frame)) {
-        return;
+        return false;
     }
     taper_e2e_protect(&frame, counter);
-    taper_count(port->send(port->context, &frame) ? &station->counters.frames_sent
-                                                  : &station->counters.send_refused);
+    const bool taken = port->send(port->context, &frame);
+    taper_count(taken ? &station->counters.frames_sent : &station->counters.send_refused);
+    return taken;
+}
+
+static uint8_t next_counter(uint8_t counter) {
+    return (uint8_t)((counter + 1) & 0x0F);
 }
 
 static int32_t validity_ms(const taper_station_config_t *config) {
@@ -127,8 +133,9 @@ static void send_setpoint(taper_station_t *station, uint8_t i) {
                 .session = taper_session_number(&station->sessions, i),
             },
     };
-    send_message(station, &message, station->setpoint_counter[i]);
-    station->setpoint_counter[i] = (uint8_t)((station->setpoint_counter[i] + 1) & 0x0F);
+    if (send_message(station, &message, station->setpoint_counter[i])) {
+        station->setpoint_counter[i] = next_counter(station->setpoint_counter[i]);
+    }
 }
 
 static taper_ctrl_status_t status_of(const taper_station_t *station) {
@@ -162,9 +169,10 @@ static void send_status(taper_station_t *station) {
     message.as.ctrl_status = status_of(station);
     const uint8_t buses = bus_count(station->options.config);
     for (message.bus = 0; message.bus < buses; message.bus++) {
-        send_message(station, &message, station->status_counter);
+        if (send_message(station, &message, station->status_counter[message.bus])) {
+            station->status_counter[message.bus] = next_counter(station->status_counter[message.bus]);
+        }
     }
-    station->status_counter = (uint8_t)((station->status_counter + 1) & 0x0F);
 }
 
 void taper_station_send(taper_station_t *station) {

@@ -16,9 +16,8 @@ int32_t taper_battery_useful_W(const taper_demand_t *demand, uint32_t tick_ms) {
     if (!demand->active || tick_ms == 0) {
         return 0;
     }
-    const int64_t allowed_W = (int64_t)demand->max_mA * demand->W_per_A / 1000;
     const int64_t completing_W = divide_up((int64_t)demand->need_Wh * 3600 * 1000, tick_ms);
-    const int32_t offered_W = taper_min_i32(taper_saturate_i32(allowed_W), taper_saturate_i32(completing_W));
+    const int32_t offered_W = taper_min_i32(taper_demand_allowed_W(demand), taper_saturate_i32(completing_W));
     return taper_min_i32(offered_W, taper_battery_limit_W(demand));
 }
 

@@ -24,8 +24,7 @@ static void wish_all_that_is_useful(const taper_snapshot_t *snapshot, uint32_t t
 }
 
 static int32_t laxity_s(const taper_demand_t *demand) {
-    const int64_t allowed_W = (int64_t)demand->max_mA * demand->W_per_A / 1000;
-    const int32_t power_W = taper_min_i32(taper_saturate_i32(allowed_W), taper_battery_limit_W(demand));
+    const int32_t power_W = taper_min_i32(taper_demand_allowed_W(demand), taper_battery_limit_W(demand));
     if (power_W <= 0) {
         return INT32_MAX; /* cannot charge: nobody is helped by putting it first */
     }

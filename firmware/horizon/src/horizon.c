@@ -71,15 +71,11 @@ static taper_real_t presence(int32_t departs_in_s, uint16_t step_s, uint8_t t) {
     return (taper_real_t)left_s / (taper_real_t)step_s;
 }
 
-static taper_real_t allowed_W(const taper_demand_t *demand) {
-    return (taper_real_t)((int64_t)demand->max_mA * demand->W_per_A) / 1000;
-}
-
 /** Steps that a vehicle could wait and still be served: its stay less the time its need takes at the present limit. */
 static taper_real_t laxity_steps(const taper_demand_t *demand, uint16_t step_s) {
-    const taper_real_t limit_W =
-        taper_real_min(allowed_W(demand), (taper_real_t)taper_battery_limit_W(demand));
-    const taper_real_t charging_s = limit_W > 0 ? (taper_real_t)demand->need_Wh * 3600 / limit_W : 0;
+    const int32_t power_W = taper_min_i32(taper_demand_allowed_W(demand), taper_battery_limit_W(demand));
+    const taper_real_t charging_s =
+        power_W > 0 ? (taper_real_t)demand->need_Wh * 3600 / (taper_real_t)power_W : 0;
     return taper_real_max((taper_real_t)demand->departs_in_s - charging_s, 0) / (taper_real_t)step_s;
 }
 
@@ -99,7 +95,7 @@ static chain_t chain_of(const taper_horizon_t *horizon, const taper_demand_t *de
     const taper_real_t step_h = (taper_real_t)step_s / 3600;
     const taper_real_t slope = taper_battery_slope_per_h(demand) * step_h;
     return (chain_t){
-        .rate = allowed_W(demand) / horizon->base_W,
+        .rate = (taper_real_t)taper_demand_allowed_W(demand) / horizon->base_W,
         .taper = (taper_real_t)taper_battery_limit_W(demand) / horizon->base_W,
         .slope = slope < 1 ? slope
                            : 1, /* a battery that fills within one step: the taper row then bounds v(i,t) */

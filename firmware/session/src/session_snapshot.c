@@ -33,9 +33,6 @@ static int32_t max_current_mA(const taper_connector_config_t *connector, const t
 }
 
 static int32_t min_current_mA(const taper_connector_config_t *connector, const taper_session_t *session) {
-    if (connector->min_mA == 0) {
-        return 0; /* the station asked for continuous currents: a study, or DC */
-    }
     /* An absent minimum is below any other. */
     const int32_t min_mA = taper_max_i32(connector->min_mA, session->used.b.min_mA);
     return round_down_to_step(min_mA + TAPER_CURRENT_STEP_mA - 1);
@@ -124,7 +121,7 @@ static void fill_battery(taper_demand_t *demand, const taper_session_t *session,
     demand->stored_Wh = taper_max_i32(session->stored_Wh, 0); /* absent becomes 0 */
     demand->peak_W = session->used.b.peak_W;
     if (demand->peak_W == TAPER_ABSENT) {
-        demand->peak_W = taper_saturate_i32((int64_t)demand->max_mA * demand->W_per_A / 1000);
+        demand->peak_W = taper_demand_allowed_W(demand);
     }
     if (demand->capacity_Wh > 0) {
         demand->taper_W = taper_clamp_i32(session->used.d.taper_W, 0, demand->peak_W); /* absent becomes 0 */

@@ -37,7 +37,8 @@ taper_status_t taper_limits_set_curve(taper_limits_t *limits, const taper_limit_
     for (uint16_t k = 0; k < curve->count; k++) {
         const bool ascending =
             k == 0 || !taper_time_reached(curve->point[k - 1].time_ms, curve->point[k].time_ms);
-        if (curve->point[k].limit_W < 0 || !ascending) {
+        const uint32_t span_ms = taper_elapsed_ms(curve->point[k].time_ms, curve->point[0].time_ms);
+        if (curve->point[k].limit_W < 0 || !ascending || span_ms > TAPER_CURVE_SPAN_ms) {
             return TAPER_ERR_ARGUMENT;
         }
     }
@@ -90,7 +91,7 @@ taper_limit_now_t taper_limits_now(const taper_limits_t *limits, uint32_t now_ms
 /** Mean of the curve over [from_ms, from_ms + length_ms), starting the search at `*point`, which moves along. */
 static int32_t mean_W(const taper_limits_t *limits, uint32_t from_ms, uint32_t length_ms, int32_t *point) {
     const taper_limit_curve_t *curve = &limits->curve;
-    if (length_ms == 0) {
+    if (length_ms == 0) { /* no checked station has such a step; a division by zero must not depend on that */
         return curve_W(limits, *point);
     }
     int64_t sum = 0;
@@ -118,7 +119,7 @@ void taper_limits_course(const taper_limits_t *limits, uint32_t now_ms, int32_t 
     const bool explained = present_W + WIRE_STEP_W > curve_W(limits, point);
     for (uint8_t t = 0; t < config->steps; t++) {
         const int32_t known_W = mean_W(limits, now_ms + t * step_ms, step_ms, &point);
-        course_W[t] = t == 0 || !explained ? taper_min_i32(known_W, present_W) : known_W;
+        course_W[t] = !explained ? taper_min_i32(known_W, present_W) : known_W;
     }
     course_W[0] = present_W;
 }

@@ -21,8 +21,6 @@
 #include "taper/supervisor.h"
 #include "taper/types.h"
 
-/** CAN buses that this image's stations use. */
-#define TAPER_MAX_BUSES ((TAPER_MAX_CONNECTORS + TAPER_NODES_PER_BUS - 1) / TAPER_NODES_PER_BUS)
 /** Protected frames a connector sends: EVSE_STATUS, EV_STATUS, EVSE_ELEC, EV_PARAM_A..D. */
 #define TAPER_FRAMES_PER_CONNECTOR 7
 
@@ -38,18 +36,16 @@ typedef struct {
     const taper_port_t *port;
     const taper_solver_t *solver; /**< generated for this station; NULL: no planner, charge by fallback */
     const taper_policy_t *policy; /**< NULL: the planner */
-    uint16_t
-        iterations_per_tick; /**< solver iterations in one control tick, >= 10; see taper_planner_run() */
+    uint16_t iterations_per_tick; /**< solver iterations in a control tick, >= TAPER_MIN_SLICE */
 } taper_station_options_t;
 
 /** What went wrong outside, and how much was done. Saturating; they never fall. */
 typedef struct {
     uint32_t frames_received, frames_sent, frames_unknown, crc_errors, frames_repeated, frames_lost,
         bad_fields;
-    uint32_t
-        frames_untrusted;  /**< sound, but from a sender with more than two errors in its last five frames */
-    uint32_t send_refused; /**< the port's queue was full */
-    uint32_t plans;        /**< solves finished, whatever the verdict */
+    uint32_t frames_untrusted; /**< sound, from a sender with more than two errors in its last five */
+    uint32_t send_refused;     /**< the port's queue was full */
+    uint32_t plans;            /**< solves finished, whatever the verdict */
     uint32_t plans_rejected;   /**< of these, not used */
     uint32_t fallback_ticks;   /**< ticks in mode FALLBACK or FAILSAFE */
     uint32_t guard_violations; /**< must stay 0 */
@@ -65,7 +61,7 @@ typedef struct {
     taper_e2e_receiver_t connector_e2e[TAPER_MAX_CONNECTORS][TAPER_FRAMES_PER_CONNECTOR];
     taper_e2e_receiver_t gateway_e2e[2]; /**< SITE_LIMIT, TIME_SYNC */
     uint8_t setpoint_counter[TAPER_MAX_CONNECTORS];
-    uint8_t status_counter;
+    uint8_t status_counter[TAPER_MAX_BUSES];
     int32_t plan_W[TAPER_MAX_CONNECTORS];       /**< first step of the last finished plan */
     uint8_t plan_session[TAPER_MAX_CONNECTORS]; /**< whom it was made for */
     uint32_t plan_made_ms;
@@ -101,7 +97,7 @@ taper_status_t taper_station_set_limit_curve(taper_station_t *station, const tap
 /** Mode of the last step. */
 taper_mode_t taper_station_mode(const taper_station_t *station);
 
-/** Site limit of the last step [W]. */
+/** Site limit of the last step [W]; 0 in mode INIT. */
 int32_t taper_station_site_limit_W(const taper_station_t *station);
 
 #endif

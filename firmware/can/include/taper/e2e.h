@@ -27,9 +27,9 @@ typedef enum {
 typedef struct {
     uint8_t counter;   /**< of the last frame with a good CRC */
     bool synchronised; /**< `counter` is set */
-    uint8_t
-        errors; /**< bit k: the frame k before the last was in error; a window of 5. A repeated frame is no news
-                            either way and does not enter it */
+    /** Bit k: the frame k before the last was in error; a window of 5. A repeated frame is no news either way and does
+        not enter it. */
+    uint8_t errors;
 } taper_e2e_receiver_t;
 
 /** CRC-8/8H2F of `length` bytes. "123456789" gives 0xDF. Cost: one table look-up per byte. */

@@ -14,6 +14,9 @@
 /** SITE_LIMIT comes every second; after this long without, the gateway is lost [ms] (docs/protocol.md). */
 #define TAPER_SITE_LIMIT_TIMEOUT_ms 5000
 
+/** Longest curve [ms]: beyond half a turn of the clock, before and after cannot be told apart. */
+#define TAPER_CURVE_SPAN_ms (UINT32_C(24) * 24 * 3600 * 1000)
+
 /** Whose limit it is. On the bus in CTRL_STATUS. */
 typedef enum {
     TAPER_LIMIT_STATION = 0,
@@ -48,7 +51,11 @@ void taper_limits_init(taper_limits_t *limits, const taper_station_config_t *con
  */
 void taper_limits_apply(taper_limits_t *limits, const taper_site_limit_t *message, uint32_t now_ms);
 
-/** Replace the known course. @return TAPER_ERR_ARGUMENT, and nothing changed, for a curve that is out of order. */
+/**
+ * Replace the known course. Times are within 24 days of now, on either side.
+ * @return TAPER_ERR_ARGUMENT, and nothing changed, for a curve that is out of order, has a negative limit, too many
+ *         points, or points more than TAPER_CURVE_SPAN_ms apart.
+ */
 taper_status_t taper_limits_set_curve(taper_limits_t *limits, const taper_limit_curve_t *curve);
 
 /**

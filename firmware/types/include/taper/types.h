@@ -22,6 +22,8 @@ typedef enum {
 
 /** Connectors on one CAN bus: nodes 1..60 (the id has six bits, 0 is the controller, 62 and 63 are taken). */
 #define TAPER_NODES_PER_BUS 60
+/** CAN buses that this image's stations use. */
+#define TAPER_MAX_BUSES ((TAPER_MAX_CONNECTORS + TAPER_NODES_PER_BUS - 1) / TAPER_NODES_PER_BUS)
 /** Parent of the root group. */
 #define TAPER_NO_GROUP UINT8_MAX
 /** A quantity that a sender did not give. Never a legal value of any field. */
@@ -123,6 +125,11 @@ typedef struct {
     int32_t W_per_A;      /**< power of 1 A on each phase in use, > 0 */
     int32_t departs_in_s; /**< time to the departure that the vehicle told; <= 0: it has passed */
 } taper_demand_t;
+
+/** What connector and vehicle allow, whatever the battery takes [W]. */
+static inline int32_t taper_demand_allowed_W(const taper_demand_t *demand) {
+    return taper_saturate_i32((int64_t)demand->max_mA * demand->W_per_A / 1000);
+}
 
 /** All demands at one instant: the only thing that horizon and fallback see of the world. */
 typedef struct {
