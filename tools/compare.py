@@ -30,6 +30,8 @@ ROOT = Path(__file__).resolve().parents[1]
 DEFAULT_SIMULATOR = Path("build/host-release/host_sim/taper-sim")
 PARALLEL_RUNS = 2
 BOUND_STEP_S = 900.0
+WIDTH_OF_ALL_COLUMNS = 160
+MAIN_COLUMNS = ("policy", "energy_kwh", "share_of_bound_percent", "satisfied", "violations", "solve_ms_p50")
 EXIT_RUN_FAILED, EXIT_LIMIT_EXCEEDED = 1, 3
 
 
@@ -111,15 +113,18 @@ def _compare(options: argparse.Namespace, runs_folder: Path, console: Console) -
 
 
 def _print_table(table: list[Measures], bound_kwh: float, console: Console) -> None:
-    shown = Table(caption=f"Clairvoyant bound: {bound_kwh:,.1f} kWh", caption_justify="left", header_style="bold")
-    for name, heading, unit in HEADINGS:
+    """All columns where they fit; in a narrower terminal those that matter most, the rest is in the report."""
+    fits = console.width >= WIDTH_OF_ALL_COLUMNS or not console.is_terminal
+    headings = [heading for heading in HEADINGS if fits or heading[0] in MAIN_COLUMNS]
+    caption = f"Clairvoyant bound: {bound_kwh:,.1f} kWh" + ("" if fits else "; more columns in the report")
+    shown = Table(caption=caption, caption_justify="left", header_style="bold")
+    for name, heading, unit in headings:
         shown.add_column(f"{heading}\n{unit}" if unit else heading, justify="left" if name == "policy" else "right",
                          no_wrap=True)
     for row in table:
-        shown.add_row(*(cell_text(row, name) for name, _, _ in HEADINGS),
+        shown.add_row(*(cell_text(row, name) for name, _, _ in headings),
                       style="bold red" if row.violations > 0 else None)
-    # A table that is cut off helps nobody: when the terminal is narrow or a file, its lines may be longer.
-    Console(width=max(console.width, 160)).print(shown)
+    Console(width=max(console.width, WIDTH_OF_ALL_COLUMNS) if fits else None).print(shown)
 
 
 def _publish(comparison: Comparison, new_runs: Path, folder: Path) -> None:

@@ -38,7 +38,7 @@ void taper_allocate(taper_allocator_t *allocator, const taper_station_config_t *
                     const taper_snapshot_t *snapshot, const taper_proposal_t *proposal, int32_t site_limit_W,
                     taper_setpoints_t *setpoints);
 
-/** Whether `setpoints` hold every limit of connectors and groups, recomputed from nothing. Cost: O(connectors x depth). */
+/** Whether `setpoints` hold every limit of connectors and groups, recomputed from nothing. Cost: O(connectors + groups). */
 bool taper_guard_passes(const taper_station_config_t *config, const taper_snapshot_t *snapshot,
                         int32_t site_limit_W, const taper_setpoints_t *setpoints);
 

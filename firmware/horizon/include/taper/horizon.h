@@ -47,7 +47,7 @@ typedef struct {
 
 /**
  * State the problem for `snapshot`. `site_limit_W[t]` is the site's limit in step t, >= 0, [config->steps].
- * Cost: O(connectors x steps + groups x steps). `horizon->config` is `config` afterwards.
+ * Cost: O(connectors x steps + groups x (steps + connectors x depth of the tree)). `horizon->config` is `config` afterwards.
  */
 void taper_horizon_build(taper_horizon_t *horizon, const taper_station_config_t *config,
                          const taper_snapshot_t *snapshot, const int32_t *site_limit_W);

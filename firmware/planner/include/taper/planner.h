@@ -53,7 +53,8 @@ taper_status_t taper_planner_init(taper_planner_t *planner, const taper_solver_t
                                   const taper_station_config_t *config);
 
 /**
- * State a new problem; one that was under way is dropped. The last answer, moved on in time, is the starting point.
+ * State a new problem. The last usable answer, moved on in time, is the starting point; after a problem that was dropped
+ * or had no usable answer, the solver starts from nothing.
  * `site_limit_W` as in taper_horizon_build(). Cost: O(rows), and one or two factorisations.
  */
 void taper_planner_start(taper_planner_t *planner, const taper_snapshot_t *snapshot,

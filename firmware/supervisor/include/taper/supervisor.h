@@ -1,5 +1,5 @@
 /**
- * The mode machine. Pure: what it is told decides, and nothing is remembered but the time of the start.
+ * The mode machine. What it is told decides; it remembers only the time of the start, and whether it has left INIT.
  *
  * | heard from the gateway               | policy has a proposal | mode     |
  * |--------------------------------------|-----------------------|----------|
