@@ -1,0 +1,120 @@
+/* The station with its planner: the whole pipeline, plans in slices, and what happens when a solve goes wrong. */
+#include <math.h>
+
+#include "solver.h"
+#include "station_bench.h"
+#include "taper/solvers.h"
+#include "unity.h"
+
+static taper_station_options_t with_solver(void) {
+    taper_station_options_t options = bench_options();
+    options.solver = taper_solvers[bench_hub_index()];
+    return options;
+}
+
+void setUp(void) {
+    const taper_station_options_t options = with_solver();
+    bench_start(&options);
+}
+void tearDown(void) {}
+
+static void test_a_soc_frame_in_gives_a_setpoint_frame_out_through_every_hop(void) {
+    bench_send_all(1, 50000);
+    bench_step();
+    bench_assert_one_vehicle_in_the_snapshot();
+    TEST_ASSERT_EQUAL(TAPER_VERDICT_SOLVED, bench.station.planner.verdict);
+    TEST_ASSERT_EQUAL(TAPER_MODE_PLAN, taper_station_mode(&bench.station));
+    TEST_ASSERT_INT32_WITHIN(80, 8000, bench.station.plan_W[0]); /* 11 kW - half of 6 kW, within tolerance */
+    TEST_ASSERT_EQUAL_INT32(8000, bench.station.proposal.ceiling_W[0]);
+    /* 8000 W / 690 V = 11.594 A, up to the step */
+    TEST_ASSERT_EQUAL_INT32(11600, bench.station.setpoints.current_mA[0]);
+
+    const taper_setpoint_t setpoint = bench_setpoint_for(1);
+    TEST_ASSERT_EQUAL(TAPER_COMMAND_CHARGE, setpoint.command);
+    TEST_ASSERT_EQUAL_INT32(11600, setpoint.current_mA);
+    TEST_ASSERT_EQUAL_UINT8(7, setpoint.session);
+    TEST_ASSERT_EQUAL_UINT8(7, setpoint.phase_mask);
+    TEST_ASSERT_EQUAL_UINT32(0, bench.station.counters.guard_violations);
+}
+
+static void test_sliced_planning_charges_by_fallback_until_the_plan_is_there(void) {
+    taper_station_options_t with = with_solver();
+    with.iterations_per_tick = 10;
+    bench_start(&with);
+    bench_send_all(8, 30000);
+    bench_step();
+    TEST_ASSERT_EQUAL(TAPER_MODE_FALLBACK, taper_station_mode(&bench.station));
+    TEST_ASSERT_GREATER_THAN_INT32(0, bench.station.setpoints.current_mA[0]);
+    for (int tick = 0; tick < 50 && taper_station_mode(&bench.station) != TAPER_MODE_PLAN; tick++) {
+        bench_send_all(8, 30000);
+        bench_step();
+    }
+    TEST_ASSERT_EQUAL(TAPER_MODE_PLAN, taper_station_mode(&bench.station));
+    TEST_ASSERT_EQUAL_UINT32(1, bench.station.counters.plans);
+}
+
+/** A NaN in the solver's memory, as a bit flip would leave it. */
+static void poison_solver(void) {
+    static OSQPFloat poisoned[TAPER_MAX_VARIABLES];
+    for (unsigned v = 0; v < TAPER_MAX_VARIABLES; v++) {
+        poisoned[v] = (OSQPFloat)NAN;
+    }
+    TEST_ASSERT_EQUAL(0, osqp_update_data_vec(bench.station.options.solver->osqp, poisoned, NULL, NULL));
+}
+
+/** Bring the station to PLAN, then into a solve that is not finished. */
+static void leave_a_solve_unfinished(void) {
+    bench_send_all(8, 30000);
+    bench_step();
+    TEST_ASSERT_EQUAL(TAPER_MODE_PLAN, taper_station_mode(&bench.station));
+    bench.station.options.iterations_per_tick = TAPER_MIN_SLICE;
+    bench_send_all(8, 9000); /* an event, far enough from the last problem for many slices */
+    bench_step();
+    TEST_ASSERT_EQUAL(TAPER_VERDICT_SOLVING, bench.station.planner.verdict);
+}
+
+static void test_while_a_renewal_is_in_work_the_plan_is_followed(void) {
+    leave_a_solve_unfinished();
+    TEST_ASSERT_EQUAL(TAPER_MODE_PLAN, taper_station_mode(&bench.station));
+    TEST_ASSERT_EQUAL_UINT32(1, bench.station.counters.plans);
+}
+
+static void test_a_poisoned_solver_means_fallback_in_the_same_tick_and_a_new_try_after_a_minute(void) {
+    leave_a_solve_unfinished();
+    poison_solver();
+    bench_send_all(8, 9000);
+    bench_step();
+    TEST_ASSERT_EQUAL(TAPER_VERDICT_NOT_FINITE, bench.station.planner.verdict);
+    TEST_ASSERT_EQUAL(TAPER_MODE_FALLBACK, taper_station_mode(&bench.station));
+    TEST_ASSERT_EQUAL_UINT32(1, bench.station.counters.plans_rejected);
+    TEST_ASSERT_GREATER_THAN_INT32(0, bench.station.setpoints.current_mA[0]);
+
+    bench.station.options.iterations_per_tick = TAPER_MAX_ITERATIONS;
+    bench_send_all(8, 9000);
+    bench_step(); /* nothing has changed: no new try yet */
+    TEST_ASSERT_EQUAL(TAPER_MODE_FALLBACK, taper_station_mode(&bench.station));
+    bench.now_ms += 60000;
+    bench_send_all(8, 9000);
+    bench_step();
+    TEST_ASSERT_EQUAL(TAPER_MODE_PLAN, taper_station_mode(&bench.station));
+    TEST_ASSERT_EQUAL_UINT32(1, bench.station.counters.plans_rejected);
+    TEST_ASSERT_EQUAL_UINT32(0, bench.station.counters.guard_violations);
+}
+
+static void test_a_plan_ends_after_two_steps_without_a_renewal(void) {
+    leave_a_solve_unfinished();
+    bench.now_ms += 2 * 900000; /* the solve was never given a tick to go on */
+    bench_send_all(8, 9000);
+    bench_step();
+    TEST_ASSERT_EQUAL(TAPER_MODE_FALLBACK, taper_station_mode(&bench.station));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_a_soc_frame_in_gives_a_setpoint_frame_out_through_every_hop);
+    RUN_TEST(test_sliced_planning_charges_by_fallback_until_the_plan_is_there);
+    RUN_TEST(test_while_a_renewal_is_in_work_the_plan_is_followed);
+    RUN_TEST(test_a_poisoned_solver_means_fallback_in_the_same_tick_and_a_new_try_after_a_minute);
+    RUN_TEST(test_a_plan_ends_after_two_steps_without_a_renewal);
+    return UNITY_END();
+}
