@@ -13,6 +13,7 @@
 
 #include "taper/allocator.h"
 #include "taper/e2e.h"
+#include "taper/event.h"
 #include "taper/fallback.h"
 #include "taper/limits.h"
 #include "taper/planner.h"
@@ -37,6 +38,9 @@ typedef struct {
     const taper_solver_t *solver; /**< generated for this station; NULL: no planner, charge by fallback */
     const taper_policy_t *policy; /**< NULL: the planner */
     uint16_t iterations_per_tick; /**< solver iterations in a control tick, >= TAPER_MIN_SLICE */
+    /** Simulation: so many times faster than the bus run batteries, departures, the wall clock and the planning steps, while
+        periods and timeouts of the bus stay as they are. `tick_ms` of the configuration counts in their time. 0 is 1. */
+    uint16_t time_scale;
 } taper_station_options_t;
 
 /** What went wrong outside, and how much was done. Saturating; they never fall. */
@@ -93,6 +97,22 @@ void taper_station_step(taper_station_t *station, uint32_t now_ms);
  * @return TAPER_ERR_ARGUMENT for too many points, times not ascending, or a negative limit; the old curve stays then.
  */
 taper_status_t taper_station_set_limit_curve(taper_station_t *station, const taper_limit_curve_t *curve);
+
+/**
+ * What is due between two control ticks: frames are taken in, a current that waited for another to drop is given, every
+ * setpoint is repeated each half second, and transfers go on. Call it when frames have come, and at least every 50 ms.
+ * A station that is only ever stepped works too; it then sends each setpoint once per tick.
+ */
+void taper_station_poll(taper_station_t *station, uint32_t now_ms);
+
+/**
+ * Going down for good: every connector is told to use its fallback current. Call it two or three times, some 50 ms apart,
+ * so that a lost frame does no harm; then do not step the station again.
+ */
+void taper_station_stop(taper_station_t *station, uint32_t now_ms);
+
+/** The event log. `count` only grows: a reader remembers how far it has read. */
+const taper_event_log_t *taper_station_events(const taper_station_t *station);
 
 /** Mode of the last step. */
 taper_mode_t taper_station_mode(const taper_station_t *station);

@@ -10,13 +10,20 @@
 
 #include "taper/frame.h"
 
+/** Copies of a record that the non-volatile store holds. */
+#define TAPER_STORE_COPIES 2u
+
 typedef struct {
     void *context;
 
-    /** Take the oldest received frame. @return false: none waiting. Must not block. */
+    /**
+     * Take the oldest received frame, with the time of its reception. @return false: none waiting. Must not block.
+     * A full queue drops its oldest frame and counts it: the newest state is what matters.
+     */
     bool (*receive)(void *context, taper_frame_t *frame);
 
-    /** Queue a frame for sending. @return false: the queue is full, the frame was not taken. Must not block. */
+    /** Queue a frame for sending. @return false: the queue is full or the bus is off, the frame was not taken.
+        Must not block. */
     bool (*send)(void *context, const taper_frame_t *frame);
 
     /** Called once at the end of every control tick that finished. NULL: the board has no watchdog. */
@@ -24,6 +31,23 @@ typedef struct {
 
     /** Free-running microseconds, for the account of solve times only: nothing is decided by it. NULL: none. */
     uint32_t (*clock_us)(void *context);
+
+    /** Whether the CAN controller of `bus` has left the bus after too many errors (bus-off). NULL: it never does. */
+    bool (*bus_is_off)(void *context, uint8_t bus);
+
+    /** Ask the controller of `bus`, which is off, to come back. NULL: it does so by itself. Must not block. */
+    void (*restart_bus)(void *context, uint8_t bus);
+
+    /** Frames lost because a receive queue was full; never falls. NULL: unknown. */
+    uint32_t (*receive_overflows)(void *context);
+
+    /**
+     * Read or write a whole copy (0..TAPER_STORE_COPIES-1) of the station's record in non-volatile memory. A write that
+     * power-off cuts short may leave that copy torn, and no other. @return false: it could not be done, or was never
+     * written. Both NULL: no store.
+     */
+    bool (*store_read)(void *context, unsigned copy, void *data, uint32_t length);
+    bool (*store_write)(void *context, unsigned copy, const void *data, uint32_t length);
 } taper_port_t;
 
 #endif

@@ -18,10 +18,6 @@
 #include "taper/message.h"
 #include "taper/types.h"
 
-/** Ages after which a report counts as absent [ms] (docs/protocol.md, timeouts). */
-#define TAPER_EVSE_STATUS_TIMEOUT_ms 1000
-#define TAPER_EV_STATUS_TIMEOUT_ms   2500
-#define TAPER_EVSE_ELEC_TIMEOUT_ms   5000
 /** A reported SOC older than this is not used to correct the estimate [s]. So is one of unknown age. */
 #define TAPER_SOC_STALE_s 60
 /** Half the step of SOC on the wire (EV_STATUS): the estimate is kept this close to a fresh report [1/10 permille]. */

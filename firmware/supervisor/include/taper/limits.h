@@ -11,19 +11,8 @@
 #include "taper/message.h"
 #include "taper/types.h"
 
-/** SITE_LIMIT comes every second; after this long without, the gateway is lost [ms] (docs/protocol.md). */
-#define TAPER_SITE_LIMIT_TIMEOUT_ms 5000
-
 /** Longest curve [ms]: beyond half a turn of the clock, before and after cannot be told apart. */
 #define TAPER_CURVE_SPAN_ms (UINT32_C(24) * 24 * 3600 * 1000)
-
-/** Whose limit it is. On the bus in CTRL_STATUS. */
-typedef enum {
-    TAPER_LIMIT_STATION = 0,
-    TAPER_LIMIT_GATEWAY = 1,
-    TAPER_LIMIT_CURVE = 2,
-    TAPER_LIMIT_FAILSAFE = 3,
-} taper_limit_source_t;
 
 typedef struct {
     const taper_station_config_t *config;

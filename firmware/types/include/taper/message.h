@@ -10,40 +10,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/** Function codes: `id = function << 6 | node`. */
-typedef enum {
-    TAPER_MESSAGE_SITE_LIMIT = 0x02,
-    TAPER_MESSAGE_SETPOINT = 0x03,
-    TAPER_MESSAGE_EVSE_STATUS = 0x04,
-    TAPER_MESSAGE_EV_STATUS = 0x05,
-    TAPER_MESSAGE_EVSE_ELEC = 0x06,
-    TAPER_MESSAGE_TIME_SYNC = 0x08,
-    TAPER_MESSAGE_CTRL_STATUS = 0x09,
-    TAPER_MESSAGE_EV_PARAM_A = 0x0A,
-    TAPER_MESSAGE_EV_PARAM_B = 0x0B,
-    TAPER_MESSAGE_EV_PARAM_C = 0x0C,
-    TAPER_MESSAGE_EV_PARAM_D = 0x10,
-} taper_message_kind_t;
-
-#define TAPER_NODE_CONTROLLER 0
-#define TAPER_NODE_GATEWAY    62
-
-/** Control-pilot states of IEC 61851-1, as EVSE_STATUS carries them. */
-typedef enum {
-    TAPER_PILOT_A = 0, /**< no vehicle */
-    TAPER_PILOT_B = 1, /**< vehicle, not ready */
-    TAPER_PILOT_C = 2, /**< vehicle, ready */
-    TAPER_PILOT_D = 3, /**< vehicle, ready, ventilation required */
-    TAPER_PILOT_E = 4, /**< no supply */
-    TAPER_PILOT_F = 5, /**< fault */
-} taper_pilot_t;
-
-typedef enum {
-    TAPER_COMMAND_PAUSE = 0,
-    TAPER_COMMAND_CHARGE = 1,
-    TAPER_COMMAND_STOP = 2,
-    TAPER_COMMAND_EMERGENCY = 15,
-} taper_command_t;
+#include "taper/bus.h"
 
 /** SITE_LIMIT, gateway to controller, 1 s; the gateway's heartbeat. */
 typedef struct {
@@ -147,12 +114,55 @@ typedef struct {
     int32_t taper_W; /**< 0..655 340: fall of the maximum power from SOC 0 to SOC 1, or absent: unknown */
 } taper_ev_param_d_t;
 
+/** EMCY, any node, event: 3 x at 20 ms, then every second while it lasts. */
+typedef struct {
+    uint8_t severity; /**< taper_severity_t */
+    uint16_t code;    /**< taper_event_code_t of the station; other nodes may use their own */
+    uint8_t reaction; /**< of the sender: 0 none, 1 its frames are dropped, 2 no current for `about`, 3 for nobody */
+    uint8_t session;  /**< 0: none */
+    uint8_t about;    /**< node that it is about; 0: the sender or the station */
+    uint8_t data;     /**< depends on the code */
+} taper_emcy_t;
+
+/** SITE_METER, gateway to controller, 1 s: what else the site draws; negative: it feeds in. */
+typedef struct {
+    int32_t other_mA[3]; /**< -3 276 700..3 276 700 per phase, or absent */
+} taper_site_meter_t;
+
+/** EVSE_INFO, connector to controller, at boot and every 5 s. */
+typedef struct {
+    uint8_t protocol_version; /**< 0..15; TAPER_PROTOCOL_VERSION is ours */
+    int32_t max_mA;           /**< 0..6 553 400, hardware, or absent */
+    int32_t min_mA;           /**< 0..127 000, or absent */
+    uint8_t kind;             /**< taper_kind_t */
+    uint8_t rotation;         /**< taper_rotation_t */
+    uint16_t firmware;        /**< version of the connector's firmware, major << 8 | minor */
+} taper_evse_info_t;
+
+/** PLAN, controller to all, each connector every few seconds: for display and for the vehicle's schedule, not control. */
+typedef struct {
+    uint8_t reason;     /**< taper_reason_t: why the connector has the current that it has */
+    int32_t power_W[3]; /**< 0..655 340, planned for this step and the next two, or absent */
+} taper_plan_t;
+
+/** CTRL_DIAG, controller to all, 1 s, one counter after the other. */
+typedef struct {
+    uint8_t index;     /**< taper_counter_t */
+    uint8_t auxiliary; /**< depends on the counter; 0 so far */
+    uint32_t value;
+} taper_ctrl_diag_t;
+
 /** One decoded frame. */
 typedef struct {
     taper_message_kind_t kind;
     uint8_t bus;
     uint8_t node;
     union {
+        taper_emcy_t emcy;
+        taper_site_meter_t site_meter;
+        taper_evse_info_t evse_info;
+        taper_plan_t plan;
+        taper_ctrl_diag_t ctrl_diag;
         taper_site_limit_t site_limit;
         taper_setpoint_t setpoint;
         taper_evse_status_t evse_status;

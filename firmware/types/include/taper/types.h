@@ -11,6 +11,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "taper/bus.h"
 #include "taper/sizes.h"
 
 /** What a call answers: 0 or one of these. Never mixed with counters (the world) or verdicts (the solver). */
@@ -165,13 +166,5 @@ typedef struct {
 typedef struct {
     int32_t current_mA[TAPER_MAX_CONNECTORS];
 } taper_setpoints_t;
-
-/** Modes of the station, on the bus in CTRL_STATUS. */
-typedef enum {
-    TAPER_MODE_INIT = 0,     /**< no limit heard yet: nothing charges */
-    TAPER_MODE_PLAN = 1,     /**< the configured policy is followed */
-    TAPER_MODE_FALLBACK = 2, /**< earliest deadline first, because there is no good plan */
-    TAPER_MODE_FAILSAFE = 3, /**< the gateway is silent: failsafe limit, earliest deadline first */
-} taper_mode_t;
 
 #endif
