@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 from bus_dbc import full_dbc
+from bus_docs import with_tables
 from bus_model import Bus, read_bus
 from toml_table import TomlError
 
@@ -32,8 +33,8 @@ def main(arguments: list[str] | None = None) -> int:
 
 def committed_files(bus: Bus) -> dict[Path, str]:
     """What the files have to hold, by path."""
-
-    return {_HERE / "taper.dbc": full_dbc(bus)}
+    page = _ROOT / "docs" / "protocol.md"
+    return {_HERE / "taper.dbc": full_dbc(bus), page: with_tables(bus, page.read_text(encoding="utf-8"), page.name)}
 
 
 if __name__ == "__main__":

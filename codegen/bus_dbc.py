@@ -13,6 +13,7 @@ _FULL_COMMENT = (
 )
 _CONNECTOR = 1  # the connector whose messages stand for all
 _LONGEST_CYCLE_ms = 65535
+FEW_CODES = 7  # so many are listed in a comment; of more, the value table tells
 
 
 def compact_dbc(bus: Bus) -> str:
@@ -104,18 +105,37 @@ def _frame_lines(frame: _Frame, is_full: bool) -> Iterator[str]:
         yield f' SG_ e2e_counter : 8|4@1+ (1,0) [0|15] "" {receivers}'
     for one in message.signals:
         place = f"{one.start}|{one.length}@1{'-' if one.signed else '+'}"
-        ends = f"[{_number(one.low * one.step)}|{_number(one.high * one.step)}]"
-        yield f' SG_ {one.name} : {place} ({_number(one.step)},0) {ends} "{one.unit}" {receivers}'
+        ends = f"[{decimal(one.low * one.step)}|{decimal(one.high * one.step)}]"
+        yield f' SG_ {one.name} : {place} ({decimal(one.step)},0) {ends} "{one.unit}" {receivers}'
 
 
-def _number(thousandths: int) -> str:
+def decimal(thousandths: int) -> str:
+    """The number without an exponent and without zeros at its end."""
     text = f"{Decimal(thousandths) / MILLI:f}"
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
-def signal_comment(signal: Signal) -> str:
-    """What the signal is, and its codes where its comment does not tell."""
-    parts = [signal.comment or (code_list(signal.values) if signal.values is not None else "")]
+def _message_comment(message: Message) -> str:
+    text = f"{message.comment.rstrip('.')}."
+    return f"{text} Timeout {timeout(message)}." if message.timeout_ms else text
+
+
+def timeout(message: Message) -> str:
+    """As "5 s, then held over"; empty without a timeout."""
+    return ", ".join(text for text in (duration(message.timeout_ms), message.timeout_note) if text)
+
+
+def duration(ms: int) -> str:
+    """As "200 ms" or "1 s"; empty for 0."""
+    if not ms:
+        return ""
+    return f"{ms} ms" if ms < 1000 else f"{ms / 1000:g} s"
+
+
+def _signal_comment(signal: Signal) -> str:
+    parts = [signal.comment]
+    if signal.values is not None and len(signal.values.codes) <= FEW_CODES:
+        parts.append(code_list(signal.values))
     if signal.absent is not None:
         parts.append(f"{signal.absent_hex} absent")
     return "; ".join(part for part in parts if part)
@@ -128,10 +148,9 @@ def code_list(values: Values) -> str:
 def _comment_lines(frame: _Frame) -> Iterator[str]:
     if frame.is_commented():
         for one in frame.message.signals:
-            if signal_comment(one):
-                yield f'CM_ SG_ {frame.identifier} {one.name} "{signal_comment(one)}";'
-    if frame.message.comment:
-        yield f'CM_ BO_ {frame.identifier} "{frame.message.comment}";'
+            if _signal_comment(one):
+                yield f'CM_ SG_ {frame.identifier} {one.name} "{_signal_comment(one)}";'
+    yield f'CM_ BO_ {frame.identifier} "{_message_comment(frame.message)}";'
 
 
 def _attribute_lines(frames: list[_Frame]) -> Iterator[str]:

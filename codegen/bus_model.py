@@ -143,6 +143,12 @@ def _text(table: Table, key: str) -> str:
     return text
 
 
+def _needed_text(table: Table, key: str) -> str:
+    if not _text(table, key):
+        raise table.error(key, "missing" if not table.has(key) else "is empty")
+    return _text(table, key)
+
+
 def _check_name(table: Table, name: str, pattern: str) -> None:
     if not re.fullmatch(pattern, name):
         raise table.error("", f'"{name}" is not a name here ({pattern})')
@@ -157,7 +163,7 @@ def _nodes(root: Table) -> dict[str, Node]:
         for other in nodes.values():
             if first <= other.last and other.first <= last:
                 raise table.error("", f"has a number of {other.name}")
-        nodes[name] = Node(name, first, last, table.string("c_name", ""), _text(table, "comment"))
+        nodes[name] = Node(name, first, last, table.string("c_name", ""), _needed_text(table, "comment"))
         table.end()
     return nodes
 
@@ -173,7 +179,7 @@ def _values(name: str, table: Table) -> Values:
             raise table.error(code.name, f"code {code.code} is not above the one before it")
     if count and codes[-1].code != len(codes) - 1:
         raise table.error("count", "the codes do not count from 0 without a gap")
-    values = Values(name, c_type, prefix, count, _text(table, "comment"), codes)
+    values = Values(name, c_type, prefix, count, _needed_text(table, "comment"), codes)
     table.end()
     return values
 
@@ -201,7 +207,7 @@ def _message(name: str, table: Table, nodes: dict[str, Node], values: dict[str, 
         cycle_note=_text(table, "cycle_note"),
         timeout_ms=table.integer("timeout_ms", 1, 65535) if table.has("timeout_ms") else 0,
         timeout_note=_text(table, "timeout_note"),
-        comment=_text(table, "comment"),
+        comment=_needed_text(table, "comment"),
         signals=signals,
     )
     table.end()
