@@ -30,6 +30,9 @@ void taper_membus_init(taper_membus_t *bus);
 /** The station's end as a port (no watchdog, no clock). `bus` must outlive it. */
 taper_port_t taper_membus_station_port(taper_membus_t *bus);
 
+/** The world's end as a port of the same kind. */
+taper_port_t taper_membus_world_port(taper_membus_t *bus);
+
 /** The world's end. @return false: nothing waiting / queue full. */
 bool taper_membus_world_receive(taper_membus_t *bus, taper_frame_t *frame);
 bool taper_membus_world_send(taper_membus_t *bus, const taper_frame_t *frame);
