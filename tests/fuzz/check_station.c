@@ -147,8 +147,8 @@ void check_station(const taper_station_t *station) {
         check_current(&config->connectors[i], demand, station->setpoints.current_mA[i]);
     }
     check_groups(station);
-    check_that(station->counters.guard_violations == 0, "guard_violations",
-               station->counters.guard_violations);
+    check_that(taper_station_counter(station, TAPER_COUNTER_GUARD_VIOLATIONS) == 0, "guard_violations",
+               taper_station_counter(station, TAPER_COUNTER_GUARD_VIOLATIONS));
 }
 
 void check_setpoint(const taper_station_config_t *config, const taper_message_t *message) {

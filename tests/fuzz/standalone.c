@@ -115,12 +115,12 @@ static void print_account(double seconds) {
     line("  vehicles that want energy", of->demands);
     line("  connectors with current", of->currents);
     line("frames that the station sent", of->answers);
-    line("station: CRC errors", of->station.crc_errors);
-    line("station: repeated", of->station.frames_repeated);
-    line("station: lost", of->station.frames_lost);
-    line("station: sender not trusted", of->station.frames_untrusted);
-    line("station: unknown", of->station.frames_unknown);
-    line("station: bad fields", of->station.bad_fields);
+    line("station: CRC errors", of->station.count[TAPER_COUNTER_CRC_ERRORS]);
+    line("station: repeated", of->station.count[TAPER_COUNTER_FRAMES_REPEATED]);
+    line("station: lost", of->station.count[TAPER_COUNTER_FRAMES_LOST]);
+    line("station: sender not trusted", of->station.count[TAPER_COUNTER_FRAMES_UNTRUSTED]);
+    line("station: unknown", of->station.count[TAPER_COUNTER_FRAMES_UNKNOWN]);
+    line("station: bad fields", of->station.count[TAPER_COUNTER_BAD_FIELDS]);
 }
 
 static uint64_t number(const char *text) {

@@ -109,10 +109,14 @@ static void grant(taper_station_t *station, taper_setpoints_t *granted) {
     }
 }
 
+bool taper_station_hands_over(const taper_station_t *station) {
+    return memcmp(&station->target, &station->setpoints, sizeof station->target) != 0;
+}
+
 /** Grant again, between ticks: what changed is due. */
 static void regrant(taper_station_t *station) {
     taper_setpoints_t granted;
-    if (memcmp(&station->target, &station->setpoints, sizeof granted) == 0) {
+    if (!taper_station_hands_over(station)) {
         return;
     }
     grant(station, &granted);
