@@ -21,7 +21,8 @@ QUEUE = 4096  # TAPER_SOCKETCAN_QUEUE
 
 
 def system(*command):
-    subprocess.run(command, check=True, timeout=PATIENCE_S, env=os.environ | {"PATH": os.environ["PATH"] + ":/usr/sbin"})
+    environment = os.environ | {"PATH": os.environ["PATH"] + ":/usr/sbin:/sbin"}
+    subprocess.run(command, check=True, timeout=PATIENCE_S, env=environment)
 
 
 def ip(*arguments):

@@ -26,6 +26,15 @@ print(json.dumps({
 sys.exit("a word on stderr")
 """
 
+WRITE_A_MEGABYTE = """
+import os, sys
+data = bytes(range(256)) * 4096
+for stream, bytes_ in ((sys.stdout, data), (sys.stderr, data[::-1])):
+    stream.buffer.write(bytes_)
+    stream.flush()
+os.kill(os.getpid(), 9)
+"""
+
 
 def start_wrapped(*command, options=(), **settings):
     return subprocess.Popen([WRAPPER, *options, *command], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
@@ -93,10 +102,8 @@ def test_the_exit_code_and_stderr_pass_through_on_their_own(seen):
 
 
 def test_a_megabyte_on_each_output_arrives_whole_even_after_a_killing_signal():
-    write = "import os, sys; d = bytes(range(256)) * 4096; sys.stdout.buffer.write(d); sys.stderr.buffer.write(d[::-1]);" \
-            "sys.stdout.flush(); sys.stderr.flush(); os.kill(os.getpid(), 9)"
     expected = bytes(range(256)) * 4096
-    code, out, err = run_wrapped(sys.executable, "-c", write)
+    code, out, err = run_wrapped(sys.executable, "-c", WRITE_A_MEGABYTE)
     assert (code, len(out), len(err)) == (128 + 9, len(expected), len(expected))
     assert (out, err) == (expected, expected[::-1])
 
@@ -109,8 +116,9 @@ def test_runs_at_the_same_time_do_not_meet():
 
 
 def test_with_r_the_command_can_make_the_medium_lose_all_frames():
-    code, out, err = run_wrapped("bash", "-c", "PATH=$PATH:/usr/sbin; tc qdisc add dev vcan0 root netem loss 100% || exit;"
-                                 "candump -T 1000 vcan0 & sleep 0.5; cansend vcan0 001#; wait; echo end", options=["-r"])
+    script = "PATH=$PATH:/usr/sbin:/sbin; tc qdisc add dev vcan0 root netem loss 100% || exit;" \
+             "candump -T 1000 vcan0 & sleep 0.5; cansend vcan0 001#; wait; echo end"
+    code, out, err = run_wrapped("bash", "-c", script, options=["-r"])
     assert (code, out, err) == (0, b"end\n", b"")
 
 
