@@ -34,13 +34,14 @@
 /** Byte 3 of a record. */
 typedef enum {
     FUZZ_TIME_STANDS = 0,
-    FUZZ_TIME_TICK = 200, /**< from here on: 1, 2 .. 50 s, then a control tick; below: so many ms */
+    FUZZ_TIME_TICK =
+        200, /**< from here on: 1, 2 .. 50 s, then a control tick; below: so many ms, then a poll */
     FUZZ_TIME_JUMP = 250, /**< from here on: 10 min, 2 h, 1, 6, 23 or 40 days, then a control tick */
 } fuzz_time_t;
 
 /** What was reached, for an account of the fuzzing; sums over all inputs. */
 typedef struct {
-    uint64_t inputs, frames, isotp_frames, transfers, steps;
+    uint64_t inputs, frames, isotp_frames, transfers, steps, polls;
     uint64_t sound; /**< frames with good end-to-end protection, by our own account */
     uint64_t decoded[TAPER_MESSAGE_ISOTP_FROM + 1u]; /**< of these, decoded; by function */
     uint64_t partly_absent;                          /**< of these, with a field out of range */
@@ -48,7 +49,7 @@ typedef struct {
     uint64_t demands;                                /**< that wanted energy */
     uint64_t currents;                               /**< that got current */
     uint64_t answers;                                /**< frames that the station sent */
-    taper_station_counters_t station;                /**< counters at the end of each input */
+    uint64_t station[TAPER_COUNTERS];                /**< the station's own counters */
 } fuzz_stats_t;
 
 extern fuzz_stats_t fuzz_stats;

@@ -164,7 +164,8 @@ def transfers() -> dict[str, bytes]:
     return {
         "curve": charging(2) + transfer(1, curve(8), 8) + charging(3),
         "curve-out-of-order": charging(2) + transfer(1, curve(4)[::-1], 4) + transfer(1, curve(4), 5),
-        "identifiers": charging(2) + transfer(3, b"DE*ABC*E1234567*", 16, 1) + transfer(5, b"", 0, TOOL) + charging(2),
+        "identifiers": charging(2) + transfer(3, b"DE*ABC*E1234567*", 16, 1) + transfer(5, b"", 0, TOOL)
+        + raw_isotp("3000000000000000", node=TOOL) * 3 + charging(2),
         "isotp-nonsense": charging(1) + raw_isotp(*torn, "1fff010100000000", "30000000000000", "32ffff0000000000",
                                                   "0801020304050607", "0000000000000000", "f000000000000000")
         + raw_isotp("0301020304050607", node=1) + charging(1),
