@@ -36,6 +36,13 @@ static const taper_station_config_t *hub(void) {
     return NULL;
 }
 
+static void start_station(void) {
+    const taper_station_options_t options = {
+        .config = hub(), .port = &world.port, .iterations_per_tick = TAPER_MIN_SLICE};
+    const taper_status_t status = taper_station_init(&world.station, &options);
+    check_that(status == TAPER_OK, "status of taper_station_init()", status);
+}
+
 static void begin(void) {
     memset(world.counter, 0, sizeof world.counter);
     memset(world.mirror, 0, sizeof world.mirror);
@@ -43,10 +50,7 @@ static void begin(void) {
     world.port = taper_membus_station_port(&world.bus);
     world.now_ms = 0u - START_BEFORE_WRAP_ms;
     taper_membus_set_time(&world.bus, world.now_ms);
-    const taper_station_options_t options = {
-        .config = hub(), .port = &world.port, .iterations_per_tick = TAPER_MIN_SLICE};
-    const taper_status_t status = taper_station_init(&world.station, &options);
-    check_that(status == TAPER_OK, "status of taper_station_init()", status);
+    start_station();
 }
 
 /** Sort a frame as a receiver should, and check what it decodes to. */
@@ -235,12 +239,30 @@ static void add_counters(void) {
     }
 }
 
+static void feed_event(const uint8_t *record) {
+    const uint8_t detail = record[5];
+    fuzz_stats.events++;
+    switch (record[4] % FUZZ_EVENTS) {
+    case FUZZ_BUS_OFF: taper_membus_bus_off(&world.bus, 0, detail); break;
+    case FUZZ_BUS_ON: taper_membus_bus_on(&world.bus, 0); break;
+    case FUZZ_POWER:
+        add_counters();
+        taper_membus_power_cycle(&world.bus);
+        start_station();
+        break;
+    case FUZZ_TEAR_WRITE: taper_membus_tear_next_write(&world.bus, detail); break;
+    default: taper_membus_rot(&world.bus, record[6], detail); break;
+    }
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     const size_t records = size / FUZZ_RECORD;
     begin();
     for (size_t k = 0; k < records; k++) {
         const uint8_t *record = data + k * FUZZ_RECORD;
-        if ((record[0] & FUZZ_TRANSFER) != 0) {
+        if ((record[0] & FUZZ_EVENT) != 0) {
+            feed_event(record);
+        } else if ((record[0] & FUZZ_TRANSFER) != 0) {
             k += feed_transfer(record, records - k - 1);
         } else {
             feed_frame(record);

@@ -30,6 +30,18 @@
  * byte 1 the number of records behind it whose data are the content, bytes 2-3 the number of items.
  */
 #define FUZZ_TRANSFER 0x04u
+/** Not a frame, but something that happens to the station: data byte 0 (fuzz_event_t, modulo their number), byte 1 a
+    detail. */
+#define FUZZ_EVENT 0x08u
+
+typedef enum {
+    FUZZ_BUS_OFF, /**< detail: restarts that it takes; 0: it comes back with FUZZ_BUS_ON */
+    FUZZ_BUS_ON,
+    FUZZ_POWER,      /**< power fails and comes back: a new station with the old store */
+    FUZZ_TEAR_WRITE, /**< detail: bytes that the next write to the store gets done */
+    FUZZ_ROT,        /**< detail: bit of a copy's first 32 bytes; data byte 2: copy */
+    FUZZ_EVENTS,
+} fuzz_event_t;
 
 /** Byte 3 of a record. */
 typedef enum {
@@ -41,7 +53,7 @@ typedef enum {
 
 /** What was reached, for an account of the fuzzing; sums over all inputs. */
 typedef struct {
-    uint64_t inputs, frames, isotp_frames, transfers, steps, polls;
+    uint64_t inputs, frames, isotp_frames, transfers, events, steps, polls;
     uint64_t sound; /**< frames with good end-to-end protection, by our own account */
     uint64_t decoded[TAPER_MESSAGE_ISOTP_FROM + 1u]; /**< of these, decoded; by function */
     uint64_t partly_absent;                          /**< of these, with a field out of range */

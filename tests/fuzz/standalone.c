@@ -134,6 +134,7 @@ static void print_account(double seconds) {
     }
     line("ISO-TP frames", of->isotp_frames);
     line("whole transfers", of->transfers);
+    line("events at the station", of->events);
     line("polls", of->polls);
     line("control ticks", of->steps);
     line("  connectors in session", of->sessions);
