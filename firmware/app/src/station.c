@@ -49,7 +49,7 @@ taper_status_t taper_station_init(taper_station_t *station, const taper_station_
 static void note_mode(taper_station_t *station, taper_mode_t before) {
     const taper_mode_t mode = station->supervisor.mode;
     if (mode != before) {
-        taper_event_note(&station->events, TAPER_EVENT_MODE, 0, 0, mode);
+        taper_event_note(&station->events, TAPER_EVENT_MODE, 0, 0, (int32_t)mode);
     }
     if (mode == TAPER_MODE_FALLBACK || mode == TAPER_MODE_FAILSAFE) {
         taper_station_count(station, TAPER_COUNTER_FALLBACK_TICKS);
