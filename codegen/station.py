@@ -18,6 +18,7 @@ MAX_CURRENT_dA = 4094  # EVSE_STATUS.current_l1: 12 bits of 0.1 A, 0xFFF says "a
 MIN_AC_CURRENT_dA = 60  # IEC 61851-1: a duty cycle of 10 % says 6 A, there is nothing below
 MAX_LIMIT_W = 3_276_700  # SITE_LIMIT.limit: 15 bits of 100 W
 MAX_VOLTAGE_mV = 1_500_000  # low voltage ends at 1500 V DC
+MAINS_mV = 230_000  # phase to neutral, IEC 60038
 MAX_SWITCH_s = 86_400
 MAX_TICK_ms = 60_000
 
@@ -58,6 +59,8 @@ class Station:
     min_on_ms: int
     min_off_ms: int
     failsafe_W: int
+    other_load_W: int
+    site_voltage_mV: int
     groups: tuple[Group, ...]
     connectors: tuple[Connector, ...]
 
@@ -76,7 +79,7 @@ class Station:
 
 
 def read_station(path: Path, shown: str | None = None) -> Station:
-    """The station in the file at `path`; raises StationError, whose text calls the file `shown`."""
+    """The station in the file at `path`; raises TomlError, whose text calls the file `shown`."""
     root = load(path, shown or str(path))
     name = _name(root, path.stem)
     description = root.string("description")
@@ -93,6 +96,11 @@ def read_station(path: Path, shown: str | None = None) -> Station:
     control.end()
     site = root.table("site")
     failsafe_W = site.quantity("failsafe_kW", 0, MAX_LIMIT_W, per_unit=1000)
+    # Without these the connection serves nothing but the station.
+    other_load_W = site.quantity("other_load_kW", 0, MAX_LIMIT_W, per_unit=1000) if site.has("other_load_kW") else 0
+    site_voltage_mV = (
+        site.quantity("voltage_V", 1, MAX_VOLTAGE_mV, per_unit=1000) if site.has("voltage_V") else MAINS_mV
+    )
     site.end()
     groups = _groups(root)
     if failsafe_W > groups[0].limit_W:
@@ -100,7 +108,18 @@ def read_station(path: Path, shown: str | None = None) -> Station:
     connectors = _connectors(root, {group.name: index for index, group in enumerate(groups)})
     root.end()
     station = Station(
-        name, description, steps, step_s, tick_ms, min_on_s * 1000, min_off_s * 1000, failsafe_W, groups, connectors
+        name=name,
+        description=description,
+        steps=steps,
+        step_s=step_s,
+        tick_ms=tick_ms,
+        min_on_ms=min_on_s * 1000,
+        min_off_ms=min_off_s * 1000,
+        failsafe_W=failsafe_W,
+        other_load_W=other_load_W,
+        site_voltage_mV=site_voltage_mV,
+        groups=groups,
+        connectors=connectors,
     )
     _check_groups_are_used(root, station)
     return station

@@ -82,7 +82,7 @@ static bool send_reports(world_t *world, int64_t now_s) {
                                            : sim_fleet_report(&world->fleet, node);
         sent = sent && ok;
     }
-    return sent;
+    return sent && world->bus.to_station.overflows == 0;
 }
 
 /** The vehicles take what they may, and it is all written down. */

@@ -15,7 +15,7 @@ void tearDown(void) {}
 
 static void allocate(const taper_station_config_t *config, const taper_snapshot_t *snapshot,
                      const taper_proposal_t *proposal, int32_t site_limit_W) {
-    taper_allocate(&allocator, config, snapshot, proposal, site_limit_W, &setpoints);
+    taper_allocate(&allocator, config, snapshot, proposal, site_limit_W, NULL, &setpoints);
 }
 
 static int64_t power_mW(const taper_snapshot_t *snapshot, uint8_t first, uint8_t last) {

@@ -1,4 +1,4 @@
-/* The in-memory bus: order, refusal, independence of the directions. */
+/* The in-memory bus: order, full queues, time stamps, bus-off, independence of the directions. */
 #include "taper/membus.h"
 #include "unity.h"
 
@@ -64,7 +64,7 @@ static void test_the_two_directions_do_not_mix(void) {
     TEST_ASSERT_FALSE(taper_membus_world_receive(&bus, &frame));
 }
 
-static void test_a_full_queue_refuses_counts_and_keeps_what_it_has(void) {
+static void test_a_full_queue_to_the_world_refuses_counts_and_keeps_what_it_has(void) {
     taper_frame_t frame;
     for (unsigned n = 0; n < TAPER_MEMBUS_DEPTH; n++) {
         const taper_frame_t sent = numbered(n);
@@ -73,8 +73,8 @@ static void test_a_full_queue_refuses_counts_and_keeps_what_it_has(void) {
     const taper_frame_t extra = numbered(0x555);
     TEST_ASSERT_FALSE(port.send(port.context, &extra));
     TEST_ASSERT_FALSE(port.send(port.context, &extra));
-    TEST_ASSERT_EQUAL_UINT32(2, bus.to_world.refused);
-    TEST_ASSERT_EQUAL_UINT32(0, bus.to_station.refused);
+    TEST_ASSERT_EQUAL_UINT32(2, bus.to_world.overflows);
+    TEST_ASSERT_EQUAL_UINT32(0, port.receive_overflows(port.context));
 
     for (unsigned n = 0; n < TAPER_MEMBUS_DEPTH; n++) {
         TEST_ASSERT_TRUE(taper_membus_world_receive(&bus, &frame));
@@ -84,39 +84,130 @@ static void test_a_full_queue_refuses_counts_and_keeps_what_it_has(void) {
     TEST_ASSERT_TRUE(port.send(port.context, &extra));
 }
 
-static void test_the_count_of_refusals_does_not_wrap(void) {
-    const taper_frame_t frame = numbered(0);
-    bus.to_station.head = TAPER_MEMBUS_DEPTH;
-    bus.to_station.refused = UINT32_MAX;
-    TEST_ASSERT_FALSE(taper_membus_world_send(&bus, &frame));
-    TEST_ASSERT_EQUAL_UINT32(UINT32_MAX, bus.to_station.refused);
-}
-
-static void test_order_is_kept_where_the_indices_wrap(void) {
-    taper_frame_t frame = numbered(0x555);
-    bus.to_station.head = UINT32_MAX - 2;
-    bus.to_station.tail = UINT32_MAX - 2;
-    for (unsigned n = 0; n < TAPER_MEMBUS_DEPTH; n++) {
+static void test_a_full_queue_to_the_station_drops_its_oldest_frames_and_counts_them(void) {
+    taper_frame_t frame;
+    for (unsigned n = 0; n < TAPER_MEMBUS_DEPTH + 3; n++) {
         const taper_frame_t sent = numbered(n);
-        TEST_ASSERT_TRUE(taper_membus_world_send(&bus, &sent));
+        TEST_ASSERT_EQUAL(n < TAPER_MEMBUS_DEPTH, taper_membus_world_send(&bus, &sent));
     }
-    TEST_ASSERT_FALSE(taper_membus_world_send(&bus, &frame));
-    for (unsigned n = 0; n < TAPER_MEMBUS_DEPTH; n++) {
+    TEST_ASSERT_EQUAL_UINT32(3, port.receive_overflows(port.context));
+    TEST_ASSERT_EQUAL_UINT32(0, bus.to_world.overflows);
+    for (unsigned n = 3; n < TAPER_MEMBUS_DEPTH + 3; n++) {
         TEST_ASSERT_TRUE(port.receive(port.context, &frame));
         assert_is_numbered(n, &frame);
     }
     TEST_ASSERT_FALSE(port.receive(port.context, &frame));
 }
 
+static void test_the_count_of_overflows_does_not_wrap(void) {
+    const taper_frame_t frame = numbered(0);
+    bus.to_station.head = TAPER_MEMBUS_DEPTH;
+    bus.to_station.overflows = UINT32_MAX;
+    TEST_ASSERT_FALSE(taper_membus_world_send(&bus, &frame));
+    TEST_ASSERT_EQUAL_UINT32(UINT32_MAX, port.receive_overflows(port.context));
+}
+
+static void test_order_is_kept_where_the_indices_wrap(void) {
+    taper_frame_t frame;
+    bus.to_station.head = UINT32_MAX - 2;
+    bus.to_station.tail = UINT32_MAX - 2;
+    for (unsigned n = 0; n < TAPER_MEMBUS_DEPTH + 5; n++) {
+        const taper_frame_t sent = numbered(n);
+        (void)taper_membus_world_send(&bus, &sent);
+    }
+    for (unsigned n = 5; n < TAPER_MEMBUS_DEPTH + 5; n++) {
+        TEST_ASSERT_TRUE(port.receive(port.context, &frame));
+        assert_is_numbered(n, &frame);
+    }
+    TEST_ASSERT_FALSE(port.receive(port.context, &frame));
+}
+
+static void test_frames_keep_their_senders_time_until_the_bus_has_one(void) {
+    taper_frame_t frame = numbered(1);
+    frame.time_ms = 77;
+    (void)taper_membus_world_send(&bus, &frame);
+    taper_membus_set_time(&bus, UINT32_MAX);
+    (void)taper_membus_world_send(&bus, &frame);
+    taper_membus_set_time(&bus, 4);
+    (void)taper_membus_world_send(&bus, &frame);
+
+    const uint32_t expected_ms[] = {77, UINT32_MAX, 4};
+    for (unsigned k = 0; k < 3; k++) {
+        TEST_ASSERT_TRUE(port.receive(port.context, &frame));
+        TEST_ASSERT_EQUAL_UINT32(expected_ms[k], frame.time_ms);
+    }
+}
+
+static void test_a_bus_that_is_off_neither_sends_nor_hears_and_the_others_do(void) {
+    taper_frame_t frame;
+    taper_frame_t on_bus_0 = numbered(1);
+    taper_frame_t on_bus_1 = numbered(2);
+    on_bus_0.bus = 0;
+    taper_membus_bus_off(&bus, 0, 0);
+    TEST_ASSERT_TRUE(port.bus_is_off(port.context, 0));
+    TEST_ASSERT_FALSE(port.bus_is_off(port.context, 1));
+
+    TEST_ASSERT_FALSE(port.send(port.context, &on_bus_0));
+    TEST_ASSERT_TRUE(port.send(port.context, &on_bus_1));
+    TEST_ASSERT_TRUE(taper_membus_world_send(&bus, &on_bus_0));
+    TEST_ASSERT_TRUE(taper_membus_world_send(&bus, &on_bus_1));
+    TEST_ASSERT_EQUAL_UINT32(1, bus.controller[0].lost);
+
+    TEST_ASSERT_TRUE(port.receive(port.context, &frame));
+    assert_is_numbered(2, &frame);
+    TEST_ASSERT_FALSE(port.receive(port.context, &frame));
+    taper_membus_bus_on(&bus, 0);
+    TEST_ASSERT_FALSE(port.bus_is_off(port.context, 0));
+    TEST_ASSERT_TRUE(port.send(port.context, &on_bus_0));
+}
+
+static void test_a_bus_comes_back_with_the_restart_that_it_needs(void) {
+    taper_membus_bus_off(&bus, 0, 3);
+    for (unsigned request = 1; request <= 3; request++) {
+        TEST_ASSERT_TRUE(port.bus_is_off(port.context, 0));
+        port.restart_bus(port.context, 0);
+    }
+    TEST_ASSERT_FALSE(port.bus_is_off(port.context, 0));
+    TEST_ASSERT_EQUAL_UINT32(3, bus.controller[0].restart_requests);
+}
+
+static void test_a_bus_that_waits_to_be_told_counts_restarts_and_stays_off(void) {
+    taper_membus_bus_off(&bus, 0, 0);
+    port.restart_bus(port.context, 0);
+    port.restart_bus(port.context, 0);
+    TEST_ASSERT_TRUE(port.bus_is_off(port.context, 0));
+    TEST_ASSERT_EQUAL_UINT32(2, bus.controller[0].restart_requests);
+}
+
+static void test_a_bus_that_does_not_exist_is_never_off(void) {
+    taper_membus_bus_off(&bus, UINT8_MAX, 0);
+    port.restart_bus(port.context, UINT8_MAX);
+    taper_membus_bus_on(&bus, UINT8_MAX);
+    TEST_ASSERT_FALSE(port.bus_is_off(port.context, UINT8_MAX));
+}
+
+static void test_a_power_cycle_empties_the_queues_and_keeps_what_was_counted(void) {
+    taper_frame_t frame = numbered(3);
+    TEST_ASSERT_TRUE(port.send(port.context, &frame));
+    TEST_ASSERT_TRUE(taper_membus_world_send(&bus, &frame));
+    bus.to_station.overflows = 9;
+    taper_membus_power_cycle(&bus);
+    TEST_ASSERT_FALSE(port.receive(port.context, &frame));
+    TEST_ASSERT_FALSE(taper_membus_world_receive(&bus, &frame));
+    TEST_ASSERT_EQUAL_UINT32(9, port.receive_overflows(port.context));
+}
+
 static void test_init_empties_a_bus_that_was_in_use(void) {
     taper_frame_t frame = numbered(3);
     TEST_ASSERT_TRUE(port.send(port.context, &frame));
     TEST_ASSERT_TRUE(taper_membus_world_send(&bus, &frame));
-    bus.to_world.refused = 9;
+    bus.to_world.overflows = 9;
+    taper_membus_bus_off(&bus, 0, 0);
     taper_membus_init(&bus);
     TEST_ASSERT_FALSE(port.receive(port.context, &frame));
     TEST_ASSERT_FALSE(taper_membus_world_receive(&bus, &frame));
-    TEST_ASSERT_EQUAL_UINT32(0, bus.to_world.refused);
+    TEST_ASSERT_EQUAL_UINT32(0, bus.to_world.overflows);
+    TEST_ASSERT_FALSE(port.bus_is_off(port.context, 0));
 }
 
 static void test_the_port_has_neither_watchdog_nor_clock(void) {
@@ -129,9 +220,16 @@ int main(void) {
     RUN_TEST(test_a_new_bus_is_empty_both_ways);
     RUN_TEST(test_frames_arrive_in_order_with_all_their_fields);
     RUN_TEST(test_the_two_directions_do_not_mix);
-    RUN_TEST(test_a_full_queue_refuses_counts_and_keeps_what_it_has);
-    RUN_TEST(test_the_count_of_refusals_does_not_wrap);
+    RUN_TEST(test_a_full_queue_to_the_world_refuses_counts_and_keeps_what_it_has);
+    RUN_TEST(test_a_full_queue_to_the_station_drops_its_oldest_frames_and_counts_them);
+    RUN_TEST(test_the_count_of_overflows_does_not_wrap);
     RUN_TEST(test_order_is_kept_where_the_indices_wrap);
+    RUN_TEST(test_frames_keep_their_senders_time_until_the_bus_has_one);
+    RUN_TEST(test_a_bus_that_is_off_neither_sends_nor_hears_and_the_others_do);
+    RUN_TEST(test_a_bus_comes_back_with_the_restart_that_it_needs);
+    RUN_TEST(test_a_bus_that_waits_to_be_told_counts_restarts_and_stays_off);
+    RUN_TEST(test_a_bus_that_does_not_exist_is_never_off);
+    RUN_TEST(test_a_power_cycle_empties_the_queues_and_keeps_what_was_counted);
     RUN_TEST(test_init_empties_a_bus_that_was_in_use);
     RUN_TEST(test_the_port_has_neither_watchdog_nor_clock);
     return UNITY_END();

@@ -2,13 +2,15 @@
 
 #include <string.h>
 
+#include "rooms.h"
+
 /** Everything one allocation needs, so that the helpers below take one argument. */
 typedef struct {
     const taper_station_config_t *config;
     const taper_snapshot_t *snapshot;
     const taper_proposal_t *proposal;
     const taper_allocator_t *allocator; /* the switches' history */
-    int64_t room_mW[TAPER_MAX_GROUPS];  /* never negative */
+    taper_rooms_t rooms;
     int32_t *current_mA;
 } round_t;
 
@@ -16,29 +18,12 @@ void taper_allocator_init(taper_allocator_t *allocator) {
     memset(allocator, 0, sizeof *allocator);
 }
 
-static void open_rooms(round_t *round, int32_t site_limit_W) {
-    for (uint8_t k = 0; k < round->config->group_count; k++) {
-        int32_t limit_W = round->config->groups[k].limit_W;
-        if (k == 0) {
-            limit_W = taper_min_i32(limit_W, site_limit_W);
-        }
-        round->room_mW[k] = (int64_t)taper_max_i32(limit_W, 0) * 1000;
-    }
-}
-
-static int64_t least_room_mW(const round_t *round, uint8_t i) {
-    int64_t least = INT64_MAX;
-    for (uint8_t k = round->config->connectors[i].group; k != TAPER_NO_GROUP;
-         k = round->config->groups[k].parent) {
-        least = round->room_mW[k] < least ? round->room_mW[k] : least;
-    }
-    return least;
-}
-
-static void take_room(round_t *round, uint8_t i, int64_t power_mW) {
-    for (uint8_t k = round->config->connectors[i].group; k != TAPER_NO_GROUP;
-         k = round->config->groups[k].parent) {
-        round->room_mW[k] -= power_mW;
+/** Rooms less what connectors that cannot be told anything may still draw. */
+static void open_rooms(round_t *round, int32_t site_limit_W, const int32_t *reserved_mA) {
+    taper_rooms_open(&round->rooms, round->config, site_limit_W);
+    for (uint8_t i = 0; reserved_mA != NULL && i < round->config->connector_count; i++) {
+        taper_rooms_take(&round->rooms, round->config, i,
+                         (int64_t)reserved_mA[i] * taper_rooms_W_per_A(round->config, round->snapshot, i));
     }
 }
 
@@ -59,12 +44,14 @@ static void raise(round_t *round, uint8_t i, int32_t target_mA) {
     if (most_mA <= present_mA) {
         return;
     }
-    const int32_t fits_mA = current_of_mA(demand, least_room_mW(round, i));
+    const int32_t booked_W_per_A = taper_demand_booked_W_per_A(demand);
+    const int64_t room_mW = taper_rooms_least(&round->rooms, round->config, i);
+    const int32_t fits_mA = room_mW <= 0 ? 0 : taper_saturate_i32(room_mW / booked_W_per_A);
     const int32_t raised_mA = whole_steps(present_mA + taper_min_i32(most_mA - present_mA, fits_mA));
     if (raised_mA <= present_mA || raised_mA < demand->min_mA) {
         return;
     }
-    take_room(round, i, (int64_t)(raised_mA - present_mA) * demand->W_per_A);
+    taper_rooms_take(&round->rooms, round->config, i, (int64_t)(raised_mA - present_mA) * booked_W_per_A);
     round->current_mA[i] = raised_mA;
 }
 
@@ -141,7 +128,7 @@ static void raise_all(round_t *round, int32_t (*target)(const round_t *, uint8_t
 
 void taper_allocate(taper_allocator_t *allocator, const taper_station_config_t *config,
                     const taper_snapshot_t *snapshot, const taper_proposal_t *proposal, int32_t site_limit_W,
-                    taper_setpoints_t *setpoints) {
+                    const int32_t *reserved_mA, taper_setpoints_t *setpoints) {
     round_t round = {
         .config = config,
         .snapshot = snapshot,
@@ -150,7 +137,7 @@ void taper_allocate(taper_allocator_t *allocator, const taper_station_config_t *
         .current_mA = setpoints->current_mA,
     };
     memset(setpoints, 0, sizeof *setpoints);
-    open_rooms(&round, site_limit_W);
+    open_rooms(&round, site_limit_W, reserved_mA);
     raise_all(&round, wished_mA);
     raise_all(&round, ceiling_mA);
     raise_all(&round, ceiling_rounded_up_mA);

@@ -2,18 +2,29 @@
 
 #include <string.h>
 
-#include "station_io.h"
+#include "station_internal.h"
 #include "taper/config_check.h"
 
-/** A plan is followed this many steps while its renewal is in work. One that could not be renewed ends at once. */
-#define PLAN_LASTS_STEPS 2u
-/** After a plan that was no good, the next try. */
-#define RETRY_ms UINT32_C(60000)
+/** A second controller that was not heard for this long is gone [ms]. */
+#define RIVAL_GONE_ms UINT32_C(5000)
 
 static bool options_are_sound(const taper_station_options_t *options) {
     return options->config != NULL && options->port != NULL && options->port->receive != NULL &&
            options->port->send != NULL && (options->policy == NULL || options->policy->propose != NULL) &&
-           options->iterations_per_tick >= TAPER_MIN_SLICE;
+           options->iterations_per_tick >= TAPER_MIN_SLICE && options->time_scale <= TAPER_MAX_TIME_SCALE;
+}
+
+static void init_layers(taper_station_t *station) {
+    const taper_station_config_t *config = station->options.config;
+    taper_session_init(&station->sessions, config);
+    taper_limits_init(&station->limits, config);
+    taper_supervisor_init(&station->supervisor);
+    taper_allocator_init(&station->allocator);
+    taper_transfers_init(&station->transfers, config);
+    station->sessions.log = &station->events;
+    station->sessions.time_scale = station->options.time_scale;
+    station->limits.log = &station->events;
+    station->limits.time_scale = station->options.time_scale;
 }
 
 taper_status_t taper_station_init(taper_station_t *station, const taper_station_options_t *options) {
@@ -26,93 +37,35 @@ taper_status_t taper_station_init(taper_station_t *station, const taper_station_
     }
     memset(station, 0, sizeof *station);
     station->options = *options;
-    taper_session_init(&station->sessions, options->config);
-    taper_limits_init(&station->limits, options->config);
-    taper_supervisor_init(&station->supervisor);
-    taper_allocator_init(&station->allocator);
+    station->options.time_scale = options->time_scale == 0 ? 1 : options->time_scale;
+    init_layers(station);
+    taper_record_load(station);
     if (options->solver != NULL) {
         return taper_planner_init(&station->planner, options->solver, options->config);
     }
     return TAPER_OK;
 }
 
-/** Events that make the planner think again; otherwise it does so once a step, and sooner after a failure. */
-static bool plan_is_due(const taper_station_t *station, int32_t site_limit_W) {
-    const uint32_t step_ms = station->options.config->step_s * UINT32_C(1000);
-    const uint32_t lasts_ms = station->plan_usable || step_ms < RETRY_ms ? step_ms : RETRY_ms;
-    return station->planner.verdict == TAPER_VERDICT_NONE || station->planned_limit_W != site_limit_W ||
-           station->planned_revision != station->sessions.revision ||
-           taper_elapsed_ms(station->snapshot.now_ms, station->planner.started_ms) >= lasts_ms;
-}
-
-static void start_plan(taper_station_t *station, int32_t site_limit_W) {
-    int32_t course_W[TAPER_MAX_STEPS];
-    taper_limits_course(&station->limits, station->snapshot.now_ms, course_W);
-    taper_planner_start(&station->planner, &station->snapshot, course_W);
-    station->planned_limit_W = site_limit_W;
-    station->planned_revision = station->sessions.revision;
-    station->solve_us = 0;
-}
-
-static uint32_t clock_us(const taper_station_t *station) {
-    const taper_port_t *port = station->options.port;
-    return port->clock_us != NULL ? port->clock_us(port->context) : 0;
-}
-
-/** Keep the first step of a finished plan: the solver's memory is about to be used for the next one. */
-static void keep_plan(taper_station_t *station) {
-    const bool usable = taper_planner_is_usable(station->planner.verdict);
-    taper_count(&station->counters.plans);
-    station->last_solve_us = station->solve_us;
-    if (!usable) {
-        taper_count(&station->counters.plans_rejected);
+static void note_mode(taper_station_t *station, taper_mode_t before) {
+    const taper_mode_t mode = station->supervisor.mode;
+    if (mode != before) {
+        taper_event_note(&station->events, TAPER_EVENT_MODE, 0, 0, mode);
     }
-    station->plan_usable = usable;
-    station->plan_made_ms = station->planner.started_ms;
-    for (uint8_t i = 0; i < station->snapshot.count; i++) {
-        station->plan_W[i] = usable ? taper_planner_power_W(&station->planner, i, 0) : 0;
-        station->plan_session[i] = station->planner.session[i];
+    if (mode == TAPER_MODE_FALLBACK || mode == TAPER_MODE_FAILSAFE) {
+        taper_station_count(station, TAPER_COUNTER_FALLBACK_TICKS);
     }
 }
 
-/** One slice of planning: start a problem if one is due, work on the one under way, keep the result. */
-static void plan(taper_station_t *station, int32_t site_limit_W) {
-    if (station->options.solver == NULL || station->options.policy != NULL) {
-        return;
-    }
-    const uint32_t began_us = clock_us(station);
-    if (station->planner.verdict != TAPER_VERDICT_SOLVING) {
-        if (!plan_is_due(station, site_limit_W)) {
-            return;
-        }
-        start_plan(station, site_limit_W);
-    }
-    const taper_verdict_t verdict =
-        taper_planner_run(&station->planner, station->options.iterations_per_tick);
-    station->solve_us += clock_us(station) - began_us;
-    if (verdict != TAPER_VERDICT_SOLVING) {
-        keep_plan(station);
-    }
-}
-
-static bool plan_is_usable(const taper_station_t *station) {
-    const uint32_t lasts_ms = station->options.config->step_s * UINT32_C(1000) * PLAN_LASTS_STEPS;
-    return station->plan_usable &&
-           taper_elapsed_ms(station->snapshot.now_ms, station->plan_made_ms) < lasts_ms;
-}
-
-/**
- * The plan as a proposal: its first step is the wish; what is useful beyond it is the ceiling, so that what rounding,
- * the solver's tolerance or a falling taper leave over goes to whom the deadline presses most. A vehicle that came
- * after the plan was made has no wish yet, only a ceiling.
- */
-static void propose_plan(taper_station_t *station) {
-    taper_propose_edf(&station->snapshot, station->options.config->tick_ms, &station->proposal);
-    for (uint8_t i = 0; i < station->snapshot.count; i++) {
-        const bool planned = station->plan_session[i] == station->snapshot.demand[i].session;
-        const int32_t plan_W = planned ? station->plan_W[i] : 0;
-        station->proposal.wish_W[i] = taper_min_i32(plan_W, station->proposal.ceiling_W[i]);
-    }
+static taper_mode_t decide_mode(taper_station_t *station, uint32_t now_ms) {
+    const taper_mode_t before = station->supervisor.mode;
+    const taper_situation_t situation = {
+        .gateway_alive = taper_limits_gateway_alive(&station->limits, now_ms),
+        .gateway_heard = station->limits.heard,
+        .proposal_ready = station->options.policy != NULL || taper_station_has_plan(station),
+    };
+    const taper_mode_t mode = taper_supervisor_update(&station->supervisor, &situation, now_ms);
+    note_mode(station, before);
+    return mode;
 }
 
 static void propose(taper_station_t *station, taper_mode_t mode, int32_t site_limit_W) {
@@ -122,56 +75,145 @@ static void propose(taper_station_t *station, taper_mode_t mode, int32_t site_li
     } else if (policy != NULL) {
         policy->propose(policy->context, &station->snapshot, site_limit_W, &station->proposal);
     } else {
-        propose_plan(station);
+        taper_station_propose_plan(station);
     }
 }
 
-static taper_mode_t decide_mode(taper_station_t *station) {
-    const uint32_t now_ms = station->snapshot.now_ms;
-    const taper_situation_t situation = {
-        .gateway_alive = taper_limits_gateway_alive(&station->limits, now_ms),
-        .gateway_heard = station->limits.heard,
-        .proposal_ready = station->options.policy != NULL || plan_is_usable(station),
-    };
-    const taper_mode_t mode = taper_supervisor_update(&station->supervisor, &situation, now_ms);
-    if (mode == TAPER_MODE_FALLBACK || mode == TAPER_MODE_FAILSAFE) {
-        taper_count(&station->counters.fallback_ticks);
-    }
-    return mode;
-}
-
-/** Setpoints for the proposal; nothing that the guard refuses gets out. */
-static void allocate(taper_station_t *station, int32_t site_limit_W) {
+/** Currents for the proposal that hold every limit, once all connectors have followed. */
+static void allocate(taper_station_t *station, int32_t site_limit_W, uint32_t now_ms) {
     const taper_station_config_t *config = station->options.config;
-    taper_allocate(&station->allocator, config, &station->snapshot, &station->proposal, site_limit_W,
-                   &station->setpoints);
-    if (!taper_guard_passes(config, &station->snapshot, site_limit_W, &station->setpoints)) {
-        taper_count(&station->counters.guard_violations);
-        memset(&station->setpoints, 0, sizeof station->setpoints);
+    int32_t reserved_mA[TAPER_MAX_CONNECTORS];
+    for (uint8_t i = 0; i < config->connector_count; i++) {
+        const bool online = taper_session_is_online(&station->sessions, i, now_ms);
+        reserved_mA[i] = online ? 0 : taper_ledger_may_mA(&station->ledger, i);
+        station->setpoint_session[i] = taper_session_number(&station->sessions, i);
+    }
+    taper_allocate(&station->allocator, config, &station->snapshot, &station->proposal, site_limit_W, reserved_mA,
+                   &station->target);
+    if (station->rival_heard || station->stopped) {
+        memset(&station->target, 0, sizeof station->target);
     }
 }
 
-void taper_station_step(taper_station_t *station, uint32_t now_ms) {
+/** What of the target is paid for by now. Nothing that the guards refuse gets out. */
+static void grant(taper_station_t *station, taper_setpoints_t *granted) {
+    const taper_station_config_t *config = station->options.config;
+    const int32_t site_W = station->limit_now.site_W;
+    taper_ledger_grant(&station->ledger, config, &station->snapshot, station->proposal.rank, site_W, &station->target,
+                       granted);
+    if (!taper_guard_passes(config, &station->snapshot, site_W, granted) ||
+        !taper_guard_hand_over_passes(&station->ledger, config, &station->snapshot, site_W, granted)) {
+        taper_station_count(station, TAPER_COUNTER_GUARD_VIOLATIONS);
+        taper_event_note(&station->events, TAPER_EVENT_GUARD, 0, 0, 0);
+        memset(granted, 0, sizeof *granted);
+    }
+}
+
+/** Grant again, between ticks: what changed is due. */
+static void regrant(taper_station_t *station) {
+    taper_setpoints_t granted;
+    if (memcmp(&station->target, &station->setpoints, sizeof granted) == 0) {
+        return;
+    }
+    grant(station, &granted);
+    for (uint8_t i = 0; i < station->options.config->connector_count; i++) {
+        if (granted.current_mA[i] != station->setpoints.current_mA[i]) {
+            station->setpoints.current_mA[i] = granted.current_mA[i];
+            station->setpoint_due[i] = true;
+        }
+    }
+}
+
+static void watch_rival(taper_station_t *station, uint32_t now_ms) {
+    if (station->rival_heard && taper_elapsed_ms(now_ms, station->rival_ms) >= RIVAL_GONE_ms) {
+        station->rival_heard = false;
+    }
+    if (station->rival_heard) {
+        taper_alarm_raise(station, TAPER_EVENT_TWO_CONTROLLERS, 0, 0, now_ms);
+    }
+}
+
+/** What step and poll begin with: the time, the frames, the state of the buses. */
+static void begin(taper_station_t *station, uint32_t now_ms) {
+    const taper_station_config_t *config = station->options.config;
+    station->events.now_ms = now_ms;
+    station->events.unix_s = taper_session_unix_s(&station->sessions, now_ms);
+    if (!station->started) {
+        station->started = true;
+        taper_ledger_init(&station->ledger, config, taper_station_validity_ms(&station->options), now_ms);
+        taper_event_note(&station->events, TAPER_EVENT_STARTED, 0, 0, taper_saturate_i32(station->record.starts));
+    }
     taper_station_receive(station, now_ms);
-    taper_session_update(&station->sessions, now_ms);
-    taper_limits_update(&station->limits, now_ms);
+    taper_ledger_update(&station->ledger, config, now_ms);
+    taper_bus_guard_update(station, now_ms);
+    watch_rival(station, now_ms);
+}
+
+static void copy_counters(taper_station_t *station) {
+    uint32_t *count = station->counters.count;
+    count[TAPER_COUNTER_CLOCK_JUMPS] = station->sessions.clock_jumps;
+    count[TAPER_COUNTER_SOC_JUMPS] = station->sessions.soc_jumps;
+    count[TAPER_COUNTER_PARAMETERS_REPAIRED] = station->sessions.repaired;
+}
+
+static void decide(taper_station_t *station, uint32_t now_ms) {
     taper_session_snapshot(&station->sessions, now_ms, &station->snapshot);
     station->limit_now = taper_limits_now(&station->limits, now_ms);
-    plan(station, station->limit_now.site_W);
-    const taper_mode_t mode = decide_mode(station);
+    taper_station_plan(station, station->limit_now.site_W);
+    const taper_mode_t mode = decide_mode(station, now_ms);
     if (mode == TAPER_MODE_INIT) {
         station->limit_now.site_W = 0;
     }
     propose(station, mode, station->limit_now.site_W);
-    allocate(station, station->limit_now.site_W);
-    taper_station_send(station);
-    if (station->options.port->kick_watchdog != NULL) {
-        station->options.port->kick_watchdog(station->options.port->context);
+    allocate(station, station->limit_now.site_W, now_ms);
+    grant(station, &station->setpoints);
+}
+
+void taper_station_step(taper_station_t *station, uint32_t now_ms) {
+    const taper_port_t *port = station->options.port;
+    begin(station, now_ms);
+    taper_session_update(&station->sessions, now_ms);
+    taper_limits_update(&station->limits, now_ms);
+    decide(station, now_ms);
+    memset(station->setpoint_due, 1, sizeof station->setpoint_due);
+    taper_station_send_setpoints(station, now_ms);
+    copy_counters(station);
+    taper_station_send_display(station, now_ms);
+    taper_alarm_update(station, now_ms);
+    taper_station_send_transfers(station, now_ms);
+    taper_station_send_status(station, now_ms);
+    taper_record_update(station, now_ms);
+    if (port->kick_watchdog != NULL) {
+        port->kick_watchdog(port->context);
     }
+}
+
+void taper_station_poll(taper_station_t *station, uint32_t now_ms) {
+    begin(station, now_ms);
+    regrant(station);
+    taper_station_send_setpoints(station, now_ms);
+    taper_alarm_update(station, now_ms);
+    taper_station_send_transfers(station, now_ms);
+}
+
+void taper_station_stop(taper_station_t *station, uint32_t now_ms) {
+    if (!station->stopped) {
+        taper_event_note(&station->events, TAPER_EVENT_STOPPED, 0, 0, 0);
+    }
+    station->stopped = true;
+    station->events.now_ms = now_ms;
+    memset(&station->target, 0, sizeof station->target); /* the fallback current of every connector is 0 */
+    memset(&station->setpoints, 0, sizeof station->setpoints);
+    memset(station->setpoint_due, 1, sizeof station->setpoint_due);
+    taper_station_send_setpoints(station, now_ms);
 }
 
 taper_status_t taper_station_set_limit_curve(taper_station_t *station, const taper_limit_curve_t *curve) {
     return curve == NULL ? TAPER_ERR_ARGUMENT : taper_limits_set_curve(&station->limits, curve);
+}
+
+const taper_event_log_t *taper_station_events(const taper_station_t *station) {
+    return &station->events;
 }
 
 taper_mode_t taper_station_mode(const taper_station_t *station) {
@@ -180,4 +222,8 @@ taper_mode_t taper_station_mode(const taper_station_t *station) {
 
 int32_t taper_station_site_limit_W(const taper_station_t *station) {
     return station->limit_now.site_W;
+}
+
+uint32_t taper_station_counter(const taper_station_t *station, taper_counter_t counter) {
+    return station->counters.count[counter];
 }

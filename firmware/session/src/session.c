@@ -18,6 +18,9 @@ static void forget_vehicle(taper_session_t *session) {
     const taper_session_t blank = {
         .status_heard = session->status_heard,
         .status = session->status,
+        .info = session->info,
+        .info_known = session->info_known,
+        .lost = session->lost,
         .session_Wh = TAPER_ABSENT,
         .stored_Wh = TAPER_ABSENT,
         .anchor_Wh = TAPER_ABSENT,
@@ -28,6 +31,7 @@ static void forget_vehicle(taper_session_t *session) {
 void taper_session_init(taper_session_table_t *table, const taper_station_config_t *config) {
     memset(table, 0, sizeof *table);
     table->config = config;
+    table->time_scale = 1;
     for (uint8_t i = 0; i < config->connector_count; i++) {
         forget_vehicle(&table->session[i]);
     }
@@ -59,6 +63,12 @@ static void hear(taper_heard_t *heard, uint32_t now_ms) {
     heard->at_ms = now_ms;
 }
 
+static void note(const taper_session_table_t *table, const taper_session_t *session, taper_event_code_t code,
+                 int32_t data) {
+    const taper_connector_config_t *connector = &table->config->connectors[session - table->session];
+    taper_event_note(table->log, code, connector->bus, connector->node, data);
+}
+
 static bool set_is_whole(const taper_session_t *session) {
     const taper_ev_params_t *p = &session->received;
     const unsigned needed = PARAM_A | PARAM_B | PARAM_C;
@@ -86,6 +96,27 @@ static void begin_stay(taper_session_t *session, uint32_t now_ms) {
     session->plugged_in_ms = now_ms;
 }
 
+/* minimum <= target <= maximum, where they were told. Planning moves the target; people should know why. */
+static bool parameters_contradict(const taper_ev_params_t *p) {
+    const int32_t target_Wh = p->c.target_Wh;
+    const bool energy = target_Wh != TAPER_ABSENT && (target_Wh < p->c.minimum_Wh || (p->c.maximum_Wh != TAPER_ABSENT &&
+                                                                                       target_Wh > p->c.maximum_Wh));
+    const bool bounds = p->c.maximum_Wh != TAPER_ABSENT && p->c.minimum_Wh > p->c.maximum_Wh;
+    const bool soc = p->a.soc_target_permille != TAPER_ABSENT &&
+                     p->a.soc_target_permille < p->a.soc_minimum_permille; /* absent is below any other */
+    return energy || bounds || soc;
+}
+
+static void note_parameters(taper_session_table_t *table, const taper_session_t *session, bool begins) {
+    if (begins) {
+        note(table, session, TAPER_EVENT_SESSION_BEGUN, session->used.a.session);
+    }
+    if (parameters_contradict(&session->used)) {
+        taper_count(&table->repaired);
+        note(table, session, TAPER_EVENT_REPAIRED, session->used.a.session);
+    }
+}
+
 /* Put the received parameters into use if they are whole; that may begin a session. */
 static void use_parameters(taper_session_table_t *table, taper_session_t *session, uint32_t now_ms) {
     const bool can_begin = session->vehicle_there && taper_session_pilot_charges(session->status.pilot);
@@ -93,25 +124,35 @@ static void use_parameters(taper_session_table_t *table, taper_session_t *sessio
         return;
     }
     if (session->in_session && session->received.a.session != session->used.a.session) {
+        note(table, session, TAPER_EVENT_SESSION_ENDED, session->used.a.session);
         begin_stay(session, now_ms);
     }
     const int32_t taper_W = matching_taper_W(session);
-    if (!session->in_session || session->received.a.revision != session->used.a.revision ||
-        taper_W != session->used.d.taper_W) {
+    const bool begins = !session->in_session;
+    const bool is_new = begins || session->received.a.revision != session->used.a.revision;
+    if (is_new || taper_W != session->used.d.taper_W) {
         table->revision++;
     }
     session->used = session->received;
     session->used.d.taper_W = taper_W;
     session->in_session = true;
+    if (is_new) {
+        note_parameters(table, session, begins);
+    }
 }
 
 static void apply_status(taper_session_table_t *table, taper_session_t *session,
                          const taper_evse_status_t *status, uint32_t now_ms) {
     session->status = *status;
     hear(&session->status_heard, now_ms);
+    if (session->lost) {
+        session->lost = false;
+        note(table, session, TAPER_EVENT_CONNECTOR_BACK, 0);
+    }
     if (!status->ev_present || status->pilot == TAPER_PILOT_A) {
         if (session->in_session) {
             table->revision++;
+            note(table, session, TAPER_EVENT_SESSION_ENDED, session->used.a.session);
         }
         forget_vehicle(session);
         return;
@@ -163,12 +204,52 @@ static void apply_parameters(taper_session_table_t *table, taper_session_t *sess
     use_parameters(table, session, now_ms);
 }
 
+/* What a connector says of itself; news only when it changes. */
+static void apply_info(taper_session_table_t *table, taper_session_t *session, const taper_evse_info_t *info) {
+    const bool first = !session->info_known;
+    const taper_evse_info_t old = session->info;
+    session->info = *info;
+    session->info_known = true;
+    if (info->protocol_version != TAPER_PROTOCOL_VERSION &&
+        (first || old.protocol_version != info->protocol_version)) {
+        note(table, session, TAPER_EVENT_VERSION, info->protocol_version);
+    }
+    if (info->rotation == TAPER_ROTATION_UNKNOWN && (first || old.rotation != info->rotation)) {
+        note(table, session, TAPER_EVENT_ROTATION, 0);
+    }
+}
+
+uint32_t taper_session_unix_s(const taper_session_table_t *table, uint32_t now_ms) {
+    if (!table->clock_heard.heard) {
+        return 0;
+    }
+    const uint64_t world_ms = (uint64_t)taper_elapsed_ms(now_ms, table->clock_heard.at_ms) * table->time_scale;
+    return table->unix_s + (uint32_t)(world_ms / 1000u);
+}
+
+/* Control runs on the monotonic clock, so a jump of the wall clock moves nothing but the departures told by it. */
+static void note_clock(taper_session_table_t *table, int32_t moved_s) {
+    table->revision++;
+    taper_event_note(table->log, TAPER_EVENT_CLOCK_SET, 0, 0, moved_s);
+}
+
 static void apply_time(taper_session_table_t *table, const taper_time_sync_t *time, uint32_t now_ms) {
     if (time->quality == 0) {
         return; /* a gateway that lost its own clock does not take ours away */
     }
+    const uint32_t at_ms = now_ms - time->ms / table->time_scale;
+    if (!table->clock_heard.heard) {
+        note_clock(table, 0);
+    } else {
+        const int64_t moved_s = (int64_t)time->unix_s - taper_session_unix_s(table, at_ms);
+        const int64_t drift_s = (int64_t)TAPER_CLOCK_JUMP_s * table->time_scale;
+        if (moved_s > drift_s || moved_s < -drift_s) {
+            taper_count(&table->clock_jumps);
+            note_clock(table, taper_saturate_i32(moved_s));
+        }
+    }
     table->unix_s = time->unix_s;
-    hear(&table->clock_heard, now_ms - time->ms);
+    hear(&table->clock_heard, at_ms);
 }
 
 bool taper_session_apply(taper_session_table_t *table, const taper_message_t *message, uint32_t now_ms) {
@@ -185,6 +266,7 @@ bool taper_session_apply(taper_session_table_t *table, const taper_message_t *me
     case TAPER_MESSAGE_EVSE_STATUS: apply_status(table, session, &message->as.evse_status, now_ms); break;
     case TAPER_MESSAGE_EV_STATUS: apply_ev(session, &message->as.ev_status, now_ms); break;
     case TAPER_MESSAGE_EVSE_ELEC: apply_elec(session, &message->as.evse_elec, now_ms); break;
+    case TAPER_MESSAGE_EVSE_INFO: apply_info(table, session, &message->as.evse_info); break;
     case TAPER_MESSAGE_EV_PARAM_A:
     case TAPER_MESSAGE_EV_PARAM_B:
     case TAPER_MESSAGE_EV_PARAM_C:
@@ -208,10 +290,19 @@ static void expire(taper_heard_t *heard, uint32_t now_ms, uint32_t timeout_ms) {
     heard->heard = taper_session_is_fresh(*heard, now_ms, timeout_ms);
 }
 
+static void note_loss(taper_session_table_t *table, taper_session_t *session, uint32_t now_ms) {
+    const bool was_heard = session->status_heard.heard;
+    expire(&session->status_heard, now_ms, TAPER_EVSE_STATUS_TIMEOUT_ms);
+    if (was_heard && !session->status_heard.heard) {
+        session->lost = true;
+        note(table, session, TAPER_EVENT_CONNECTOR_LOST, 0);
+    }
+}
+
 static void carry_clock(taper_session_table_t *table, uint32_t now_ms) {
     const uint32_t elapsed_ms = taper_elapsed_ms(now_ms, table->clock_heard.at_ms);
     if (table->clock_heard.heard && elapsed_ms >= CLOCK_CARRY_ms) {
-        table->unix_s += elapsed_ms / 1000u;
+        table->unix_s += elapsed_ms / 1000u * table->time_scale;
         table->clock_heard.at_ms += elapsed_ms / 1000u * 1000u;
     }
 }
@@ -220,10 +311,13 @@ void taper_session_update(taper_session_table_t *table, uint32_t now_ms) {
     carry_clock(table, now_ms);
     for (uint8_t i = 0; i < table->config->connector_count; i++) {
         taper_session_t *session = &table->session[i];
-        expire(&session->status_heard, now_ms, TAPER_EVSE_STATUS_TIMEOUT_ms);
+        note_loss(table, session, now_ms);
         expire(&session->ev_heard, now_ms, TAPER_EV_STATUS_TIMEOUT_ms);
         expire(&session->elec_heard, now_ms, TAPER_EVSE_ELEC_TIMEOUT_ms);
-        taper_session_estimate(session, now_ms);
+        if (taper_session_estimate(session, now_ms)) {
+            taper_count(&table->soc_jumps);
+            note(table, session, TAPER_EVENT_SOC_JUMP, session->ev.soc_permille);
+        }
         note_activity(table, i, now_ms);
     }
 }

@@ -70,8 +70,9 @@ static bool jump_is_believed(taper_session_t *session) {
     return session->jump_count >= TAPER_SOC_JUMP_REPORTS;
 }
 
-/* Bring the estimate into the range that a reported SOC stands for, unless it lies too far off to be believed. */
-static void correct_by_soc(taper_session_t *session, int32_t capacity_Wh) {
+/* Bring the estimate into the range that a reported SOC stands for, unless it lies too far off to be believed.
+   @return whether this report is the first of a jump. */
+static bool correct_by_soc(taper_session_t *session, int32_t capacity_Wh) {
     const int32_t reported_Wh = energy_at(session->ev.soc_permille, capacity_Wh);
     const int32_t quantum_Wh = (int32_t)((int64_t)capacity_Wh * TAPER_SOC_QUANTUM_tenth_permille / 10000);
     const int32_t low_Wh = reported_Wh - quantum_Wh;
@@ -83,10 +84,11 @@ static void correct_by_soc(taper_session_t *session, int32_t capacity_Wh) {
             session->stored_Wh = reported_Wh;
             session->jump_count = 0;
         }
-        return;
+        return session->jump_count == 1;
     }
     session->jump_count = 0;
     session->stored_Wh = taper_clamp_i32(session->stored_Wh, low_Wh, high_Wh);
+    return false;
 }
 
 /* The same SOC of a battery that turned out to have another size. */
@@ -97,13 +99,13 @@ static void rescale(taper_session_t *session, int32_t capacity_Wh) {
     session->stored_of_Wh = capacity_Wh;
 }
 
-void taper_session_estimate(taper_session_t *session, uint32_t now_ms) {
+bool taper_session_estimate(taper_session_t *session, uint32_t now_ms) {
     const int32_t capacity_Wh = taper_session_capacity_Wh(session);
     const bool soc_is_new = session->soc_is_new && taper_session_soc_is_fresh(session, now_ms);
     session->soc_is_new = false;
     if (capacity_Wh == 0) {
         session->stored_Wh = TAPER_ABSENT;
-        return;
+        return false;
     }
     if (capacity_Wh != session->stored_of_Wh) {
         rescale(session, capacity_Wh);
@@ -112,7 +114,5 @@ void taper_session_estimate(taper_session_t *session, uint32_t now_ms) {
         begin(session, capacity_Wh, now_ms);
     }
     follow_energy(session, capacity_Wh);
-    if (soc_is_new && session->stored_Wh != TAPER_ABSENT) {
-        correct_by_soc(session, capacity_Wh);
-    }
+    return soc_is_new && session->stored_Wh != TAPER_ABSENT && correct_by_soc(session, capacity_Wh);
 }

@@ -26,8 +26,9 @@ bool taper_session_soc_is_fresh(const taper_session_t *session, uint32_t now_ms)
 /**
  * Bring the estimate of stored energy up to date with all reports of a tick. Energy comes first, so that a SOC is
  * compared with what had flowed when it was reported, in whatever order the frames came.
+ * @return whether a SOC jumped away from the estimate and is not believed yet; once per jump.
  */
-void taper_session_estimate(taper_session_t *session, uint32_t now_ms);
+bool taper_session_estimate(taper_session_t *session, uint32_t now_ms);
 
 /** Fill in `demand`; all zero unless active. @return `demand->active`. */
 bool taper_session_demand(const taper_session_table_t *table, uint8_t connector, uint32_t now_ms,

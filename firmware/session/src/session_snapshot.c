@@ -10,16 +10,33 @@ static int32_t round_down_to_step(int32_t current_mA) {
     return current_mA - current_mA % TAPER_CURRENT_STEP_mA;
 }
 
-static bool may_charge(const taper_session_t *session, uint32_t now_ms) {
+bool taper_session_is_online(const taper_session_table_t *table, uint8_t connector, uint32_t now_ms) {
+    return taper_session_is_fresh(table->session[connector].status_heard, now_ms, TAPER_EVSE_STATUS_TIMEOUT_ms);
+}
+
+/* PLANNED: nothing speaks against charging. The first that applies, from the connector to the vehicle. */
+static taper_reason_t obstacle(const taper_session_table_t *table, uint8_t connector, uint32_t now_ms) {
+    const taper_session_t *session = &table->session[connector];
     const taper_ev_status_t *ev = &session->ev;
-    if (!session->in_session ||
-        !taper_session_is_fresh(session->status_heard, now_ms, TAPER_EVSE_STATUS_TIMEOUT_ms)) {
-        return false;
+    if (!taper_session_is_online(table, connector, now_ms)) {
+        return TAPER_REASON_OFFLINE;
+    }
+    if (session->info_known && session->info.protocol_version != TAPER_PROTOCOL_VERSION) {
+        return TAPER_REASON_VERSION;
+    }
+    if (!session->vehicle_there) {
+        return TAPER_REASON_NO_VEHICLE;
     }
     if (!taper_session_pilot_charges(session->status.pilot) || session->status.fault || ev->error != 0) {
-        return false;
+        return TAPER_REASON_FAULT;
     }
-    return !ev->complete && !ev->pause_requested && !ev->stop_requested;
+    if (ev->complete) {
+        return TAPER_REASON_COMPLETE;
+    }
+    if (ev->pause_requested || ev->stop_requested) {
+        return TAPER_REASON_VEHICLE_PAUSE;
+    }
+    return session->in_session ? TAPER_REASON_PLANNED : TAPER_REASON_NO_PARAMETERS;
 }
 
 static int32_t max_current_mA(const taper_connector_config_t *connector, const taper_session_t *session,
@@ -39,17 +56,23 @@ static int32_t min_current_mA(const taper_connector_config_t *connector, const t
 }
 
 /* Booked by the higher of nominal and measured voltage: too little power offered rather than too much drawn. */
-static int32_t watts_per_ampere(const taper_connector_config_t *connector, const taper_session_t *session,
-                                uint32_t now_ms) {
+static int32_t volts(const taper_connector_config_t *connector, const taper_session_t *session, uint32_t now_ms) {
     int32_t voltage_mV = connector->voltage_mV;
     if (taper_session_is_fresh(session->elec_heard, now_ms, TAPER_EVSE_ELEC_TIMEOUT_ms)) {
         voltage_mV = taper_max_i32(voltage_mV, session->elec.voltage_mV); /* absent is below any other */
     }
-    int32_t phases = connector->phases;
-    if (session->status.phases > 0) {
-        phases = taper_min_i32(phases, session->status.phases);
-    }
-    return phases * ((voltage_mV + 999) / 1000);
+    return (voltage_mV + 999) / 1000;
+}
+
+static int32_t phases_in_use(const taper_connector_config_t *connector, const taper_session_t *session) {
+    const int32_t phases = connector->phases;
+    return session->status.phases > 0 ? taper_min_i32(phases, session->status.phases) : phases;
+}
+
+/* A connector that does not know which phase it is wired to could be on any: it counts on all three. */
+static int32_t phases_booked(const taper_connector_config_t *connector, const taper_session_t *session) {
+    const bool anywhere = session->info_known && session->info.rotation == TAPER_ROTATION_UNKNOWN;
+    return anywhere && !connector->is_dc ? 3 : phases_in_use(connector, session);
 }
 
 /* minimum <= target <= maximum, repaired by moving the target; where the bounds contradict, the maximum holds. */
@@ -106,11 +129,10 @@ static int32_t departs_in_s(const taper_session_table_t *table, const taper_sess
                             uint32_t now_ms) {
     const int32_t departure_min = session->used.b.departure_min;
     if (!table->clock_heard.heard || departure_min == TAPER_ABSENT) {
-        const uint32_t here_s = taper_elapsed_ms(now_ms, session->plugged_in_ms) / 1000u;
-        return TAPER_DEFAULT_STAY_s - (int32_t)here_s;
+        const uint64_t here_ms = (uint64_t)taper_elapsed_ms(now_ms, session->plugged_in_ms) * table->time_scale;
+        return taper_saturate_i32(TAPER_DEFAULT_STAY_s - (int64_t)(here_ms / 1000u));
     }
-    const uint32_t held_over_s = taper_elapsed_ms(now_ms, table->clock_heard.at_ms) / 1000u;
-    return departure_in_s(departure_min, table->unix_s + held_over_s);
+    return departure_in_s(departure_min, taper_session_unix_s(table, now_ms));
 }
 
 /* Battery and taper, for a demand whose currents are set. */
@@ -133,14 +155,14 @@ bool taper_session_demand(const taper_session_table_t *table, uint8_t connector,
     const taper_connector_config_t *config = &table->config->connectors[connector];
     const taper_session_t *session = &table->session[connector];
     memset(demand, 0, sizeof *demand);
-    if (!may_charge(session, now_ms)) {
+    if (obstacle(table, connector, now_ms) != TAPER_REASON_PLANNED) {
         return false;
     }
     const int32_t wanted_Wh = need_Wh(session);
     const int32_t max_mA = max_current_mA(config, session, now_ms);
     const int32_t min_mA = min_current_mA(config, session);
-    const int32_t W_per_A = watts_per_ampere(config, session, now_ms);
-    if (wanted_Wh <= 0 || max_mA <= 0 || min_mA > max_mA || W_per_A <= 0) {
+    const int32_t voltage_V = volts(config, session, now_ms);
+    if (wanted_Wh <= 0 || max_mA <= 0 || min_mA > max_mA) {
         return false;
     }
     demand->active = true;
@@ -148,14 +170,29 @@ bool taper_session_demand(const taper_session_table_t *table, uint8_t connector,
     demand->need_Wh = wanted_Wh;
     demand->max_mA = max_mA;
     demand->min_mA = min_mA;
-    demand->W_per_A = W_per_A;
+    demand->W_per_A = voltage_V * phases_in_use(config, session);
+    demand->booked_W_per_A = voltage_V * phases_booked(config, session);
     demand->departs_in_s = departs_in_s(table, session, now_ms);
     fill_battery(demand, session, now_ms);
     return true;
 }
 
+taper_reason_t taper_session_idle_reason(const taper_session_table_t *table, uint8_t connector, uint32_t now_ms) {
+    const taper_reason_t reason = obstacle(table, connector, now_ms);
+    if (reason != TAPER_REASON_PLANNED) {
+        return reason;
+    }
+    const taper_session_t *session = &table->session[connector];
+    if (need_Wh(session) <= 0) {
+        return TAPER_REASON_COMPLETE;
+    }
+    const taper_connector_config_t *config = &table->config->connectors[connector];
+    const bool fits = max_current_mA(config, session, now_ms) >= taper_max_i32(min_current_mA(config, session), 1);
+    return fits ? TAPER_REASON_PLANNED : TAPER_REASON_VEHICLE_LIMIT;
+}
+
 void taper_session_snapshot(const taper_session_table_t *table, uint32_t now_ms, taper_snapshot_t *snapshot) {
-    snapshot->now_ms = now_ms;
+    snapshot->now_ms = now_ms * table->time_scale;
     snapshot->count = table->config->connector_count;
     for (uint8_t i = 0; i < snapshot->count; i++) {
         (void)taper_session_demand(table, i, now_ms, &snapshot->demand[i]);

@@ -28,6 +28,7 @@ static const taper_connector_config_t continuous_connectors[] = {CONNECTOR(0, 1,
      .connectors = (table), \
      .groups = groups,      \
      .failsafe_W = 4000,    \
+     .site_voltage_mV = 230000, \
      .tick_ms = 1000,       \
      .min_on_ms = 300000,   \
      .min_off_ms = 300000,  \

@@ -13,6 +13,7 @@ static const taper_station_config_t station = {
     .connectors = connectors,
     .groups = groups,
     .failsafe_W = 4200,
+    .site_voltage_mV = 230000,
     .tick_ms = 1000,
     .step_s = 900,
     .steps = 4,

@@ -31,12 +31,13 @@ void taper_allocator_init(taper_allocator_t *allocator);
 /**
  * Bound `proposal` by the limits of connectors, vehicles and groups; `site_limit_W` (negative counts as 0) bounds
  * group 0 besides its own limit. A connector gets at least its minimum current or nothing. With a minimum, it stays on
- * for `min_on_ms` while there is room, and off for `min_off_ms`.
+ * for `min_on_ms` while there is room, and off for `min_off_ms`. `reserved_mA` [connectors] is kept free for connectors
+ * that are silent, but may still draw; NULL: nothing.
  * Cost: O(connectors x depth of the tree), three times.
  */
 void taper_allocate(taper_allocator_t *allocator, const taper_station_config_t *config,
                     const taper_snapshot_t *snapshot, const taper_proposal_t *proposal, int32_t site_limit_W,
-                    taper_setpoints_t *setpoints);
+                    const int32_t *reserved_mA, taper_setpoints_t *setpoints);
 
 /** Whether `setpoints` hold every limit of connectors and groups, recomputed from nothing. Cost: O(connectors + groups). */
 bool taper_guard_passes(const taper_station_config_t *config, const taper_snapshot_t *snapshot,

@@ -1,12 +1,17 @@
 /**
- * The station: the whole pipeline behind one call.
+ * The station: the whole pipeline behind two calls.
  *
  *     static taper_station_t station;                       // the caller owns the memory, all of it
  *     taper_station_init(&station, &options);
- *     for (;;) taper_station_step(&station, now_ms());      // once per control tick
+ *     for (;;) {
+ *         taper_station_step(&station, now_ms());           // once per control tick
+ *         taper_station_poll(&station, now_ms());           // between ticks, at least every 50 ms
+ *     }
  *
  * A step drains the receive queue, takes a snapshot, lets the planner work one slice, chooses a proposal, bounds it by
- * every hard limit, and sends one setpoint to every connector. It never blocks and never allocates.
+ * every hard limit and by what connectors may still draw, and sends a setpoint to every connector. A poll does what
+ * cannot wait for the next tick. Neither ever blocks or allocates. What the station does depends on the frames with
+ * their times and on the times of the calls, and on nothing else: a recorded bus can be replayed to the bit.
  */
 #ifndef TAPER_STATION_H
 #define TAPER_STATION_H
@@ -15,15 +20,24 @@
 #include "taper/e2e.h"
 #include "taper/event.h"
 #include "taper/fallback.h"
+#include "taper/ledger.h"
 #include "taper/limits.h"
 #include "taper/planner.h"
 #include "taper/port.h"
 #include "taper/session.h"
 #include "taper/supervisor.h"
+#include "taper/transfers.h"
 #include "taper/types.h"
 
-/** Protected frames a connector sends: EVSE_STATUS, EV_STATUS, EVSE_ELEC, EV_PARAM_A..D. */
+/** Periodic protected frames of a connector with a vehicle: EVSE_STATUS, EV_STATUS, EVSE_ELEC, EV_PARAM_A..D. */
 #define TAPER_FRAMES_PER_CONNECTOR 7
+/** All protected frames that a connector, or the gateway, can send: the number of end-to-end receivers. */
+#define TAPER_CONNECTOR_RECEIVERS 9
+#define TAPER_GATEWAY_RECEIVERS   4
+/** Steps ahead that PLAN tells. */
+#define TAPER_PLAN_STEPS 3
+/** Alarms that EMCY can repeat at once. */
+#define TAPER_ALARMS 8
 
 /** A policy that takes the planner's place: what the allocator gets in mode PLAN. */
 typedef struct {
@@ -38,22 +52,59 @@ typedef struct {
     const taper_solver_t *solver; /**< generated for this station; NULL: no planner, charge by fallback */
     const taper_policy_t *policy; /**< NULL: the planner */
     uint16_t iterations_per_tick; /**< solver iterations in a control tick, >= TAPER_MIN_SLICE */
-    /** Simulation: so many times faster than the bus run batteries, departures, the wall clock and the planning steps, while
-        periods and timeouts of the bus stay as they are. `tick_ms` of the configuration counts in their time. 0 is 1. */
+    /** Simulation: so many times faster than the bus run batteries, departures, the wall clock and the planning steps,
+        while periods and timeouts of the bus stay as they are. `tick_ms` of the configuration counts in their time.
+        0 is 1, a real station. At most TAPER_MAX_TIME_SCALE. */
     uint16_t time_scale;
 } taper_station_options_t;
 
-/** What went wrong outside, and how much was done. Saturating; they never fall. */
+#define TAPER_MAX_TIME_SCALE 1000
+
+/** What went wrong outside, and how much was done, by taper_counter_t. Saturating; they never fall. */
 typedef struct {
-    uint32_t frames_received, frames_sent, frames_unknown, crc_errors, frames_repeated, frames_lost,
-        bad_fields;
-    uint32_t frames_untrusted; /**< sound, from a sender with more than two errors in its last five */
-    uint32_t send_refused;     /**< the port's queue was full */
-    uint32_t plans;            /**< solves finished, whatever the verdict */
-    uint32_t plans_rejected;   /**< of these, not used */
-    uint32_t fallback_ticks;   /**< ticks in mode FALLBACK or FAILSAFE */
-    uint32_t guard_violations; /**< must stay 0 */
+    uint32_t count[TAPER_COUNTERS];
 } taper_station_counters_t;
+
+/** The listener's state for one node. */
+typedef struct {
+    uint32_t tokens_x1000;     /**< frames that it may still send, in thousandths */
+    uint32_t refilled_ms;
+    uint32_t excess_ms;        /**< last frame above the rate */
+    uint32_t excess_since_ms;  /**< first one of this excess */
+    bool in_excess, babbling;
+    bool known;                /**< heard before: the tokens count */
+    uint16_t emcy_code;        /**< its last EMCY, and when */
+    uint32_t emcy_ms;
+    bool bad_field_noted;      /**< at `bad_field_ms`: the log is not for every frame */
+    uint32_t bad_field_ms;
+} taper_node_guard_t;
+
+/** One CAN bus of the station, as a sender sees it. */
+typedef struct {
+    bool silent;              /**< nothing is sent until `retry_ms` */
+    bool refusing;            /**< since `refusing_since_ms` nothing was taken */
+    uint32_t refusing_since_ms;
+    uint32_t retry_ms;
+    uint32_t back_ms;         /**< when it was last taken into use again */
+    uint8_t backoff_s;        /**< of the next pause */
+} taper_bus_guard_t;
+
+/** A lasting condition that EMCY tells. */
+typedef struct {
+    uint8_t code; /**< taper_event_code_t; 0: free */
+    uint8_t bus, node;
+    uint8_t sent;        /**< times, saturating */
+    uint32_t raised_ms;  /**< last time that it was seen */
+    uint32_t next_ms;    /**< of the next EMCY */
+} taper_alarm_t;
+
+/** What survives a restart. Written whole, two copies in turn. */
+typedef struct {
+    uint32_t sequence;
+    int32_t failsafe_W; /**< the gateway's last word on it */
+    uint32_t starts;
+    uint32_t crc32;     /**< over the rest */
+} taper_station_record_t;
 
 typedef struct {
     taper_station_options_t options;
@@ -62,12 +113,35 @@ typedef struct {
     taper_supervisor_t supervisor;
     taper_planner_t planner;
     taper_allocator_t allocator;
-    taper_e2e_receiver_t connector_e2e[TAPER_MAX_CONNECTORS][TAPER_FRAMES_PER_CONNECTOR];
-    taper_e2e_receiver_t gateway_e2e[2]; /**< SITE_LIMIT, TIME_SYNC */
+    taper_ledger_t ledger;
+    taper_transfers_t transfers;
+    taper_limit_curve_t incoming_curve; /**< being taken over from a transfer */
+    taper_event_log_t events;
+    taper_e2e_receiver_t connector_e2e[TAPER_MAX_CONNECTORS][TAPER_CONNECTOR_RECEIVERS];
+    taper_e2e_receiver_t gateway_e2e[TAPER_GATEWAY_RECEIVERS];
+    taper_node_guard_t connector_guard[TAPER_MAX_CONNECTORS];
+    taper_node_guard_t gateway_guard;
+    taper_bus_guard_t bus[TAPER_MAX_BUSES];
+    taper_alarm_t alarm[TAPER_ALARMS];
+    taper_station_record_t record;
+    uint8_t record_copy;    /**< the copy to write next */
+    uint32_t record_ms;     /**< of the last write */
+    bool rival_heard;       /**< a second controller speaks */
+    uint32_t rival_ms;      /**< when it was last heard */
+    bool started;           /**< there was a step or a poll: the ledger has begun */
+    bool stopped;
     uint8_t setpoint_counter[TAPER_MAX_CONNECTORS];
+    uint8_t plan_counter[TAPER_MAX_CONNECTORS];
+    uint8_t setpoint_session[TAPER_MAX_CONNECTORS]; /**< whom the setpoints were decided for */
+    bool setpoint_due[TAPER_MAX_CONNECTORS];        /**< decided, but not sent yet */
+    uint32_t setpoint_ms[TAPER_MAX_CONNECTORS];     /**< when one was last sent */
     uint8_t status_counter[TAPER_MAX_BUSES];
-    int32_t plan_W[TAPER_MAX_CONNECTORS];       /**< first step of the last finished plan */
-    uint8_t plan_session[TAPER_MAX_CONNECTORS]; /**< whom it was made for */
+    uint8_t diag_counter[TAPER_MAX_BUSES];
+    uint8_t emcy_counter[TAPER_MAX_BUSES];
+    uint32_t second_ms;     /**< when PLAN and CTRL_DIAG last went out */
+    uint8_t next_plan, next_diag;
+    int32_t plan_W[TAPER_PLAN_STEPS][TAPER_MAX_CONNECTORS]; /**< first steps of the last finished plan */
+    uint8_t plan_session[TAPER_MAX_CONNECTORS];             /**< whom it was made for */
     uint32_t plan_made_ms;
     bool plan_usable;
     int32_t planned_limit_W; /**< site limit and table revision of the last problem */
@@ -76,13 +150,14 @@ typedef struct {
     taper_limit_now_t limit_now; /**< of the last step */
     taper_snapshot_t snapshot;   /**< of the last step */
     taper_proposal_t proposal;   /**< of the last step */
-    taper_setpoints_t setpoints; /**< of the last step */
+    taper_setpoints_t target;    /**< of the last step: what holds every limit once all have followed */
+    taper_setpoints_t setpoints; /**< what is sent: of that, what is paid for */
     uint32_t last_solve_us;      /**< wall time of the last finished solve, by the port's clock_us */
     taper_station_counters_t counters;
 } taper_station_t;
 
 /**
- * Bring the station up in mode INIT.
+ * Bring the station up in mode INIT, with what the port's store has kept.
  * @return TAPER_ERR_ARGUMENT for a NULL or out-of-range option, TAPER_ERR_CONFIG for a station description that
  *         contradicts itself or is larger than this image's sizes. The station must then not be stepped.
  */
@@ -92,16 +167,9 @@ taper_status_t taper_station_init(taper_station_t *station, const taper_station_
 void taper_station_step(taper_station_t *station, uint32_t now_ms);
 
 /**
- * Replace the known course of the site limit. Times are on the station's clock, within 24 days; the curve is copied.
- * It can only lower the site limit that the configuration and the gateway give.
- * @return TAPER_ERR_ARGUMENT for too many points, times not ascending, or a negative limit; the old curve stays then.
- */
-taper_status_t taper_station_set_limit_curve(taper_station_t *station, const taper_limit_curve_t *curve);
-
-/**
  * What is due between two control ticks: frames are taken in, a current that waited for another to drop is given, every
  * setpoint is repeated each half second, and transfers go on. Call it when frames have come, and at least every 50 ms.
- * A station that is only ever stepped works too; it then sends each setpoint once per tick.
+ * A station that is only ever stepped works too; it then sends each setpoint once per tick. Cost: O(connectors x depth).
  */
 void taper_station_poll(taper_station_t *station, uint32_t now_ms);
 
@@ -111,13 +179,26 @@ void taper_station_poll(taper_station_t *station, uint32_t now_ms);
  */
 void taper_station_stop(taper_station_t *station, uint32_t now_ms);
 
+/**
+ * Replace the known course of the site limit. Times are on the world's clock (`now_ms` times the time scale), within 24
+ * days; the curve is copied. It can only lower the site limit that the configuration and the gateway give.
+ * @return TAPER_ERR_ARGUMENT for too many points, times not ascending, or a negative limit; the old curve stays then.
+ */
+taper_status_t taper_station_set_limit_curve(taper_station_t *station, const taper_limit_curve_t *curve);
+
 /** The event log. `count` only grows: a reader remembers how far it has read. */
 const taper_event_log_t *taper_station_events(const taper_station_t *station);
+
+/** Why a connector has the current that it has, by the last step. */
+taper_reason_t taper_station_reason(const taper_station_t *station, uint8_t connector);
 
 /** Mode of the last step. */
 taper_mode_t taper_station_mode(const taper_station_t *station);
 
-/** Site limit of the last step [W]; 0 in mode INIT. */
+/** Site limit of the last step [W], for charging; 0 in mode INIT. */
 int32_t taper_station_site_limit_W(const taper_station_t *station);
+
+/** One of the counters. */
+uint32_t taper_station_counter(const taper_station_t *station, taper_counter_t counter);
 
 #endif

@@ -12,6 +12,9 @@
  *     LOG_REQUEST    tool -> station      no items
  *     LOG            station -> tool      items of 16 bytes: time_ms u32, unix_s u32, data i32, code, bus, node, 0
  *     ANSWER         station -> sender    one item of 1 byte: taper_transfer_answer_t
+ *
+ * Every whole message is answered: with LOG if it asks for it, otherwise with ANSWER. A torn one is not. A new message
+ * from the same sender ends an answer or a log that is still on its way out.
  */
 #ifndef TAPER_TRANSFERS_H
 #define TAPER_TRANSFERS_H
@@ -19,6 +22,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "taper/crc32.h"
 #include "taper/event.h"
 #include "taper/frame.h"
 #include "taper/isotp.h"
@@ -26,6 +30,17 @@
 
 #define TAPER_TRANSFER_VERSION  1
 #define TAPER_IDENTIFIER_LENGTH 24
+
+/** Bytes of a transfer that are not items: header and CRC-32. */
+#define TAPER_TRANSFER_ENVELOPE 8u
+#define TAPER_CURVE_ITEM        6u
+#define TAPER_LOG_ITEM          16u
+
+/** What the station asks its senders to keep: at most so many frames between two of its polls [frames, ms]. */
+#define TAPER_TRANSFER_BLOCK_SIZE    32
+#define TAPER_TRANSFER_SEPARATION_ms 2
+/** Flow controls "wait" in a row that the station bears. */
+#define TAPER_TRANSFER_WAITS 10
 
 typedef enum {
     TAPER_TRANSFER_LIMIT_CURVE = 1,
@@ -43,19 +58,21 @@ typedef enum {
     TAPER_ANSWER_CLOCK = 4,   /**< a curve in Unix time, and our clock was never set */
 } taper_transfer_answer_t;
 
-/** CRC-32 of IEEE 802.3 ("123456789" gives 0xCBF43926). */
-uint32_t taper_crc32(const uint8_t *data, uint32_t length);
-
-/** The station's end of all transfers. Private to the app layer; the caller owns the memory. */
+/** The station's end of all transfers. Private to the app layer, but for the two counters; the caller owns the memory. */
 typedef struct {
     const taper_station_config_t *config;
+    uint32_t accepted; /**< transfers that took effect; never falls */
+    uint32_t refused;  /**< ISO-TP messages that were torn, ran out of time, or were not valid; never falls */
     taper_isotp_t gateway, tool, connector;
-    uint8_t gateway_buffer[8 + TAPER_MAX_LIMIT_POINTS * 6];
+    uint8_t gateway_buffer[TAPER_TRANSFER_ENVELOPE + TAPER_MAX_LIMIT_POINTS * TAPER_CURVE_ITEM];
     uint8_t tool_buffer[16];
-    uint8_t connector_buffer[8 + TAPER_IDENTIFIER_LENGTH];
-    uint8_t connector_bus, connector_node; /**< whose transfer `connector` is in; node 0: nobody's */
+    uint8_t connector_buffer[TAPER_TRANSFER_ENVELOPE + TAPER_IDENTIFIER_LENGTH];
+    uint8_t connector_bus, connector_node; /**< whose transfer `connector` is in; node 0: nobody's yet */
+    uint8_t connector_index;
+    uint8_t turn; /**< link that is asked first for its next frame */
     uint8_t gateway_answer[16], connector_answer[16];
-    uint8_t log[8 + TAPER_EVENTS * 16]; /**< being sent to the tool */
+    uint8_t log[TAPER_TRANSFER_ENVELOPE +
+                TAPER_EVENTS * TAPER_LOG_ITEM]; /**< or the answer being sent to the tool */
     char identifier[TAPER_MAX_CONNECTORS][TAPER_IDENTIFIER_LENGTH + 1];
 } taper_transfers_t;
 
@@ -63,7 +80,7 @@ typedef struct {
 typedef enum {
     TAPER_RESULT_NONE,
     TAPER_RESULT_CURVE,      /**< the curve is in `curve` */
-    TAPER_RESULT_IDENTIFIER, /**< the identifier of `connector` changed */
+    TAPER_RESULT_IDENTIFIER, /**< the identifier of `connector` was told */
     TAPER_RESULT_REFUSED,    /**< torn, corrupt or not valid; nothing changed */
 } taper_transfer_result_t;
 
@@ -72,17 +89,24 @@ void taper_transfers_init(taper_transfers_t *transfers, const taper_station_conf
 
 /** The station's side of a transfer: its clock, its log. */
 typedef struct {
-    uint32_t now_ms;                /**< station's clock */
+    uint32_t now_ms; /**< station's clock */
     bool clock_is_set;
-    uint32_t unix_s;                /**< wall clock at `now_ms` */
-    uint32_t time_scale;            /**< world seconds per second of the bus; 1 on a real station */
+    uint32_t unix_s;     /**< wall clock at `now_ms` */
+    uint32_t time_scale; /**< world seconds per second of the bus; 1 on a real station */
     const taper_event_log_t *events;
 } taper_transfer_scene_t;
 
 /**
- * Take in a frame of function ISOTP_FROM (from gateway, tool or a connector of the station). When it completes a curve,
- * `*curve` is filled, with times on the station's world clock (`now_ms * time_scale`, wrapping); points past are merged
- * into one of now. The curve counts as accepted only after taper_transfers_answer().
+ * Take in a frame of function ISOTP_FROM (from gateway, tool or a connector of the station); others are left alone. When
+ * it completes a curve, `*curve` is filled, with times on the station's world clock (`now_ms * time_scale`, wrapping);
+ * points past are merged into one of now. No point is more than TAPER_CURVE_SPAN_ms ahead, and a curve without points is
+ * one too: nothing is known any more. The curve counts as accepted only after taper_transfers_answer(); until then
+ * `*curve` is the caller's, and nothing here remembers it. `*curve` and `*connector` are not touched otherwise.
+ *
+ * The connectors share one link. While it is with one of them, the others are not heard: ISO-TP lets them run into their
+ * timeout, and they have to try again.
+ *
+ * Cost: O(bytes of the message) for the frame that completes it, O(connectors) for the first of a connector.
  */
 taper_transfer_result_t taper_transfers_take(taper_transfers_t *transfers, const taper_frame_t *frame,
                                              const taper_transfer_scene_t *scene, taper_limit_curve_t *curve,
@@ -91,8 +115,15 @@ taper_transfer_result_t taper_transfers_take(taper_transfers_t *transfers, const
 /** Tell the gateway what became of its curve. */
 void taper_transfers_answer(taper_transfers_t *transfers, taper_transfer_answer_t answer, uint32_t now_ms);
 
-/** The next frame to send, if one is due; given again until taper_transfers_sent(). */
+/**
+ * The next frame to send, if one is due; the link that did not have its way last comes first, so that a bus that is off
+ * does not block the others. A frame that is not reported by taper_transfers_sent() before the next call is given again
+ * in its turn. A peer may ask for frames without a gap: take a few in a row only, setpoints wait behind them. A
+ * transfer that ran out of time is counted in `refused` here.
+ */
 bool taper_transfers_next(taper_transfers_t *transfers, uint32_t now_ms, taper_frame_t *frame);
+
+/** `frame`, the last one given, is out. */
 void taper_transfers_sent(taper_transfers_t *transfers, const taper_frame_t *frame, uint32_t now_ms);
 
 /** Identifier of the vehicle at a connector; empty: none. */

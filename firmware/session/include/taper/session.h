@@ -5,6 +5,9 @@
  * The state of charge between and beyond reports is carried on by the measured energy, so a vehicle without SOC, or
  * with a stale one, keeps being planned for.
  *
+ * `at_ms` of a report is when it was received, on the clock of the bus. The wall clock and departures run `time_scale`
+ * times faster than that in a simulation, and like it on a real station.
+ *
  * A session begins when a connector reports a vehicle (control pilot B, C or D) and EV_PARAM A, B and C agree on their
  * revision, A and B on the session number. It ends when the connector reports no vehicle; another session number on the
  * same connector begins a new one. A new revision of the parameters is used once it is whole; until then the old one.
@@ -15,6 +18,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "taper/event.h"
 #include "taper/message.h"
 #include "taper/types.h"
 
@@ -35,6 +39,8 @@
 #define TAPER_OPEN_NEED_LEAST_Wh 1000
 /** Stay assumed for a vehicle that told no departure, or while the clock was never set [s]. */
 #define TAPER_DEFAULT_STAY_s (8 * 3600)
+/** A wall clock this far from where our own has got to was set: a jump, not drift [s]. */
+#define TAPER_CLOCK_JUMP_s 5
 
 /** One report and when it came. */
 typedef struct {
@@ -56,11 +62,14 @@ typedef struct {
     taper_evse_status_t status;
     taper_ev_status_t ev;
     taper_evse_elec_t elec;
+    taper_evse_info_t info;     /**< of the connector, whichever vehicle is there */
+    bool info_known;
     taper_ev_params_t received; /**< newest of each frame; they may disagree */
     taper_ev_params_t used;     /**< last set that agreed; `d.taper_W` is absent unless D agreed as well */
     uint8_t param_seen;         /**< bit 0: A .. bit 3: D received since the vehicle came */
     bool vehicle_there;         /**< by the last EVSE_STATUS */
     bool in_session;            /**< `used` is set */
+    bool lost;                  /**< its heartbeat was there and is gone */
     bool wants_energy;          /**< `active` of its demand at the last update */
     uint32_t plugged_in_ms;     /**< when the vehicle, or else the session, was first seen */
     int32_t session_Wh;         /**< last energy measured in this session, or absent */
@@ -75,21 +84,26 @@ typedef struct {
 typedef struct {
     const taper_station_config_t *config;
     taper_session_t session[TAPER_MAX_CONNECTORS];
+    taper_event_log_t *log;    /**< NULL: none */
+    uint32_t time_scale;       /**< world seconds per second of the bus; 1 on a real station */
+    uint32_t clock_jumps;      /**< counters; they never fall */
+    uint32_t soc_jumps;        /**< SOC reports that were not believed */
+    uint32_t repaired;         /**< parameter sets that contradicted themselves */
     uint32_t unix_s;           /**< at `clock_heard.at_ms` */
     taper_heard_t clock_heard; /**< the last TIME_SYNC with quality above 0; held over for ever */
     uint32_t revision;         /**< changes with whatever should make the planner think again */
 } taper_session_table_t;
 
-/** Empty the table. `config` must outlive it. */
+/** Empty the table, without a log, time scale 1. `config` must outlive it. */
 void taper_session_init(taper_session_table_t *table, const taper_station_config_t *config);
 
 /**
- * Take in one decoded message received at `now_ms`. Messages that do not concern sessions, or come from a node that
+ * Take in one decoded message received at `at_ms`. Messages that do not concern sessions, or come from a node that
  * the station does not have, are ignored. Cost: constant where connectors are numbered in the order of their nodes,
  * else a scan for the index.
  * @return whether the message was for this table.
  */
-bool taper_session_apply(taper_session_table_t *table, const taper_message_t *message, uint32_t now_ms);
+bool taper_session_apply(taper_session_table_t *table, const taper_message_t *message, uint32_t at_ms);
 
 /**
  * Draw the conclusions from what came in: forget reports past their timeout, bring the estimates of stored energy up to
@@ -100,11 +114,20 @@ bool taper_session_apply(taper_session_table_t *table, const taper_message_t *me
 void taper_session_update(taper_session_table_t *table, uint32_t now_ms);
 
 /**
- * What every vehicle wants at `now_ms`, that of the last update. Reports past their timeout do not count; what a
+ * What every vehicle wants at `now_ms`, that of the last update; `snapshot->now_ms` is in the world's time. Reports past their timeout do not count; what a
  * vehicle asked for (complete, pause, stop) and its error hold until it says otherwise, since vehicles that are done
  * fall asleep. Demands that are not active are all zero. Cost: O(connectors).
  */
 void taper_session_snapshot(const taper_session_table_t *table, uint32_t now_ms, taper_snapshot_t *snapshot);
+
+/** Why a connector without an active demand has none: TAPER_REASON_PLANNED for one that has. Cost: constant. */
+taper_reason_t taper_session_idle_reason(const taper_session_table_t *table, uint8_t connector, uint32_t now_ms);
+
+/** Whether the heartbeat of a connector is there. */
+bool taper_session_is_online(const taper_session_table_t *table, uint8_t connector, uint32_t now_ms);
+
+/** Wall clock at `now_ms` [Unix s]; 0: never set. */
+uint32_t taper_session_unix_s(const taper_session_table_t *table, uint32_t now_ms);
 
 /** Index of the connector at (`bus`, `node`), or -1. */
 int taper_session_connector(const taper_station_config_t *config, uint8_t bus, uint8_t node);

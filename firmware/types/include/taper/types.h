@@ -102,6 +102,8 @@ typedef struct {
     const taper_connector_config_t *connectors; /**< [connector_count] */
     const taper_group_config_t *groups;         /**< [group_count] */
     int32_t failsafe_W;                         /**< site limit while the gateway is silent */
+    int32_t other_load_W;                       /**< most that the site draws besides: assumed while its meter is silent */
+    int32_t site_voltage_mV;                    /**< phase to neutral, turns the meter's currents into power */
     uint32_t tick_ms;                           /**< control tick */
     uint32_t min_on_ms;                         /**< a connector that was switched on stays on this long */
     uint32_t min_off_ms; /**< and off this long, for the contactor's and vehicle's sake */
@@ -124,6 +126,7 @@ typedef struct {
     int32_t max_mA;       /**< least of connector and vehicle limit, per phase */
     int32_t min_mA;       /**< greatest of connector and vehicle minimum */
     int32_t W_per_A;      /**< power of 1 A on each phase in use, > 0 */
+    int32_t booked_W_per_A; /**< counts against limits; more than W_per_A while its phases are not known */
     int32_t departs_in_s; /**< time to the departure that the vehicle told; <= 0: it has passed */
 } taper_demand_t;
 
@@ -132,10 +135,15 @@ static inline int32_t taper_demand_allowed_W(const taper_demand_t *demand) {
     return taper_saturate_i32((int64_t)demand->max_mA * demand->W_per_A / 1000);
 }
 
+/** What 1 A on each phase in use counts against limits [W]. */
+static inline int32_t taper_demand_booked_W_per_A(const taper_demand_t *demand) {
+    return taper_max_i32(demand->booked_W_per_A, demand->W_per_A);
+}
+
 /** All demands at one instant: the only thing that horizon and fallback see of the world. */
 typedef struct {
-    uint32_t now_ms;
-    uint8_t count; /**< connectors of the station */
+    uint32_t now_ms; /**< of the world: the bus's time times `time_scale` */
+    uint8_t count;   /**< connectors of the station */
     taper_demand_t demand[TAPER_MAX_CONNECTORS];
 } taper_snapshot_t;
 

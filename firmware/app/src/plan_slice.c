@@ -1,0 +1,88 @@
+/* The planner within the station: when to think, and for how long the result is good. */
+#include "station_internal.h"
+
+/** A plan is followed this many steps while its renewal is in work. One that could not be renewed ends at once. */
+#define PLAN_LASTS_STEPS 2u
+/** After a plan that was no good, the next try. */
+#define RETRY_ms UINT32_C(60000)
+
+/** Events that make the planner think again; otherwise it does so once a step, and sooner after a failure. */
+static bool plan_is_due(const taper_station_t *station, int32_t site_limit_W) {
+    const uint32_t step_ms = station->options.config->step_s * UINT32_C(1000);
+    const uint32_t lasts_ms = station->plan_usable || step_ms < RETRY_ms ? step_ms : RETRY_ms;
+    return station->planner.verdict == TAPER_VERDICT_NONE || station->planned_limit_W != site_limit_W ||
+           station->planned_revision != station->sessions.revision ||
+           taper_elapsed_ms(station->snapshot.now_ms, station->planner.started_ms) >= lasts_ms;
+}
+
+static void start_plan(taper_station_t *station, int32_t site_limit_W) {
+    int32_t course_W[TAPER_MAX_STEPS];
+    taper_limits_course(&station->limits, station->events.now_ms, course_W);
+    taper_planner_start(&station->planner, &station->snapshot, course_W);
+    station->planned_limit_W = site_limit_W;
+    station->planned_revision = station->sessions.revision;
+    station->solve_us = 0;
+}
+
+static uint32_t clock_us(const taper_station_t *station) {
+    const taper_port_t *port = station->options.port;
+    return port->clock_us != NULL ? port->clock_us(port->context) : 0;
+}
+
+/** Keep the first steps of a finished plan: the solver's memory is about to be used for the next one. */
+static void keep_plan(taper_station_t *station) {
+    const bool usable = taper_planner_is_usable(station->planner.verdict);
+    taper_station_count(station, TAPER_COUNTER_PLANS);
+    station->last_solve_us = station->solve_us;
+    if (!usable) {
+        taper_station_count(station, TAPER_COUNTER_PLANS_REJECTED);
+    }
+    station->plan_usable = usable;
+    station->plan_made_ms = station->planner.started_ms;
+    for (uint8_t i = 0; i < station->snapshot.count; i++) {
+        for (uint8_t t = 0; t < TAPER_PLAN_STEPS; t++) {
+            const bool planned = usable && t < station->options.config->steps;
+            station->plan_W[t][i] = planned ? taper_planner_power_W(&station->planner, i, t) : 0;
+        }
+        station->plan_session[i] = station->planner.session[i];
+    }
+}
+
+void taper_station_plan(taper_station_t *station, int32_t site_limit_W) {
+    if (station->options.solver == NULL || station->options.policy != NULL) {
+        return;
+    }
+    const uint32_t began_us = clock_us(station);
+    if (station->planner.verdict != TAPER_VERDICT_SOLVING) {
+        if (!plan_is_due(station, site_limit_W)) {
+            return;
+        }
+        start_plan(station, site_limit_W);
+    }
+    const taper_verdict_t verdict =
+        taper_planner_run(&station->planner, station->options.iterations_per_tick);
+    station->solve_us += clock_us(station) - began_us;
+    if (verdict != TAPER_VERDICT_SOLVING) {
+        keep_plan(station);
+    }
+}
+
+bool taper_station_has_plan(const taper_station_t *station) {
+    const uint32_t lasts_ms = station->options.config->step_s * UINT32_C(1000) * PLAN_LASTS_STEPS;
+    return station->plan_usable &&
+           taper_elapsed_ms(station->snapshot.now_ms, station->plan_made_ms) < lasts_ms;
+}
+
+/**
+ * The plan's first step is the wish; what is useful beyond it is the ceiling, so that what rounding, the solver's
+ * tolerance or a falling taper leave over goes to whom the deadline presses most. A vehicle that came after the plan was
+ * made has no wish yet, only a ceiling.
+ */
+void taper_station_propose_plan(taper_station_t *station) {
+    taper_propose_edf(&station->snapshot, station->options.config->tick_ms, &station->proposal);
+    for (uint8_t i = 0; i < station->snapshot.count; i++) {
+        const bool planned = station->plan_session[i] == station->snapshot.demand[i].session;
+        const int32_t plan_W = planned ? station->plan_W[0][i] : 0;
+        station->proposal.wish_W[i] = taper_min_i32(plan_W, station->proposal.ceiling_W[i]);
+    }
+}

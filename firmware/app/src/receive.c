@@ -1,0 +1,249 @@
+/* Frames in: who sent them, whether to believe them, and where they go. */
+#include <string.h>
+
+#include "station_internal.h"
+#include "taper/codec.h"
+
+/** Frames taken in one call: what all nodes send in three seconds. A babbling bus cannot hold the station up. */
+#define MAX_FRAMES (TAPER_MAX_CONNECTORS * 32u + 64u)
+
+/** Nominal frames a second, rounded up: EVSE_STATUS, EV_STATUS, EVSE_ELEC, EV_PARAM_A..D, EVSE_INFO; and the gateway's
+    SITE_LIMIT, SITE_METER, TIME_SYNC. Three times that is too much. */
+#define CONNECTOR_NOMINAL                                                                               \
+    (1000u / TAPER_EVSE_STATUS_CYCLE_ms + 1000u / TAPER_EV_STATUS_CYCLE_ms + 1000u / TAPER_EVSE_ELEC_CYCLE_ms + \
+     4000u / TAPER_EV_PARAM_A_CYCLE_ms + 1u)
+#define GATEWAY_NOMINAL 3u
+#define TOO_MUCH        3u
+
+/** The log takes this long to hear of the same trouble of the same node again. */
+#define SAME_TROUBLE_ms UINT32_C(60000)
+
+/** Who sent a frame, and what its receiver remembers of it. */
+typedef struct {
+    taper_node_guard_t *guard;
+    taper_e2e_receiver_t *receiver;
+    int connector; /**< -1: the gateway */
+} sender_t;
+
+/** Place of a connector's message kind among its end-to-end receivers, or -1. */
+static int connector_place(unsigned function) {
+    switch (function) {
+    case TAPER_MESSAGE_EVSE_STATUS: return 0;
+    case TAPER_MESSAGE_EV_STATUS: return 1;
+    case TAPER_MESSAGE_EVSE_ELEC: return 2;
+    case TAPER_MESSAGE_EV_PARAM_A: return 3;
+    case TAPER_MESSAGE_EV_PARAM_B: return 4;
+    case TAPER_MESSAGE_EV_PARAM_C: return 5;
+    case TAPER_MESSAGE_EV_PARAM_D: return 6;
+    case TAPER_MESSAGE_EVSE_INFO: return 7;
+    case TAPER_MESSAGE_EMCY: return 8;
+    default: return -1;
+    }
+}
+
+static int gateway_place(unsigned function) {
+    switch (function) {
+    case TAPER_MESSAGE_SITE_LIMIT: return 0;
+    case TAPER_MESSAGE_TIME_SYNC: return 1;
+    case TAPER_MESSAGE_SITE_METER: return 2;
+    case TAPER_MESSAGE_EMCY: return 3;
+    default: return -1;
+    }
+}
+
+/** @return false for a frame that this station does not listen to. */
+static bool find_sender(taper_station_t *station, const taper_frame_t *frame, sender_t *sender) {
+    const unsigned function = (unsigned)frame->id >> 6;
+    const uint8_t node = (uint8_t)(frame->id & 0x3Fu);
+    if (node == TAPER_NODE_GATEWAY && frame->bus == 0) {
+        const int place = gateway_place(function);
+        *sender = (sender_t){&station->gateway_guard, &station->gateway_e2e[place < 0 ? 0 : place], -1};
+        return place >= 0;
+    }
+    const int place = connector_place(function);
+    const int connector = taper_session_connector(station->options.config, frame->bus, node);
+    if (place < 0 || connector < 0) {
+        return false;
+    }
+    *sender = (sender_t){&station->connector_guard[connector], &station->connector_e2e[connector][place], connector};
+    return true;
+}
+
+static void note_bad_frames(taper_station_t *station, const taper_frame_t *frame, bool was_valid) {
+    const uint8_t node = (uint8_t)(frame->id & 0x3Fu);
+    if (was_valid) {
+        taper_event_note(&station->events, TAPER_EVENT_BAD_FRAMES, frame->bus, node, frame->id >> 6);
+    }
+    taper_alarm_raise(station, TAPER_EVENT_BAD_FRAMES, frame->bus, node, station->events.now_ms);
+}
+
+/** The counter of what a frame turned out to be; TAPER_COUNTERS for a good one. */
+static taper_counter_t counter_of(taper_e2e_check_t check) {
+    switch (check) {
+    case TAPER_E2E_OK: return TAPER_COUNTERS;
+    case TAPER_E2E_OK_SOME_LOST:
+    case TAPER_E2E_WRONG_SEQUENCE: return TAPER_COUNTER_FRAMES_LOST;
+    case TAPER_E2E_REPEATED: return TAPER_COUNTER_FRAMES_REPEATED;
+    case TAPER_E2E_CRC_ERROR:
+    default: return TAPER_COUNTER_CRC_ERRORS;
+    }
+}
+
+/** Whether a frame is sound, new, and of a sender that is to be believed. */
+static bool is_good(taper_station_t *station, taper_e2e_receiver_t *receiver, const taper_frame_t *frame) {
+    const bool was_valid = taper_e2e_is_valid(receiver);
+    const taper_e2e_check_t check = taper_e2e_check(receiver, frame);
+    const taper_counter_t counter = counter_of(check);
+    if (counter != TAPER_COUNTERS) {
+        taper_station_count(station, counter);
+    }
+    if (!taper_e2e_is_valid(receiver)) {
+        note_bad_frames(station, frame, was_valid);
+    }
+    if (check != TAPER_E2E_OK && check != TAPER_E2E_OK_SOME_LOST) {
+        return false;
+    }
+    if (!taper_e2e_is_valid(receiver)) {
+        taper_station_count(station, TAPER_COUNTER_FRAMES_UNTRUSTED);
+        return false;
+    }
+    return true;
+}
+
+static void note_bad_field(taper_station_t *station, const sender_t *sender, const taper_frame_t *frame) {
+    taper_node_guard_t *guard = sender->guard;
+    taper_station_count(station, TAPER_COUNTER_BAD_FIELDS);
+    if (!guard->bad_field_noted || taper_elapsed_ms(frame->time_ms, guard->bad_field_ms) >= SAME_TROUBLE_ms) {
+        guard->bad_field_noted = true;
+        guard->bad_field_ms = frame->time_ms;
+        taper_event_note(&station->events, TAPER_EVENT_BAD_FIELD, frame->bus, (uint8_t)(frame->id & 0x3Fu),
+                         frame->id >> 6);
+    }
+}
+
+static void hear_emcy(taper_station_t *station, const sender_t *sender, const taper_message_t *message,
+                      uint32_t at_ms) {
+    taper_node_guard_t *guard = sender->guard;
+    const uint16_t code = message->as.emcy.code;
+    if (guard->emcy_code != code || taper_elapsed_ms(at_ms, guard->emcy_ms) >= SAME_TROUBLE_ms) {
+        taper_event_note(&station->events, TAPER_EVENT_EMCY_HEARD, message->bus, message->node, code);
+        guard->emcy_ms = at_ms;
+    }
+    guard->emcy_code = code;
+}
+
+static void use_message(taper_station_t *station, const sender_t *sender, const taper_message_t *message,
+                        uint32_t at_ms) {
+    switch (message->kind) {
+    case TAPER_MESSAGE_SITE_LIMIT: taper_limits_apply(&station->limits, &message->as.site_limit, at_ms); break;
+    case TAPER_MESSAGE_SITE_METER:
+        taper_limits_apply_meter(&station->limits, &message->as.site_meter, at_ms);
+        break;
+    case TAPER_MESSAGE_EMCY: hear_emcy(station, sender, message, at_ms); break;
+    case TAPER_MESSAGE_EVSE_STATUS:
+        taper_ledger_hear(&station->ledger, (uint8_t)sender->connector, &message->as.evse_status, at_ms);
+        (void)taper_session_apply(&station->sessions, message, at_ms);
+        break;
+    default: (void)taper_session_apply(&station->sessions, message, at_ms); break;
+    }
+}
+
+/** A frame with an identifier that only a controller sends, and sound: there is a second one (fault 20). */
+static void hear_rival(taper_station_t *station, const taper_frame_t *frame) {
+    taper_e2e_receiver_t fresh = {0};
+    if (taper_e2e_check(&fresh, frame) != TAPER_E2E_OK) {
+        taper_station_count(station, TAPER_COUNTER_CRC_ERRORS);
+        return;
+    }
+    if (!station->rival_heard) {
+        taper_event_note(&station->events, TAPER_EVENT_TWO_CONTROLLERS, frame->bus, 0, frame->id >> 6);
+    }
+    station->rival_heard = true;
+    station->rival_ms = frame->time_ms;
+}
+
+static bool is_ours_to_send(const taper_frame_t *frame) {
+    const unsigned function = (unsigned)frame->id >> 6;
+    const unsigned node = frame->id & 0x3Fu;
+    return (function == TAPER_MESSAGE_SETPOINT && node >= 1 && node <= TAPER_NODES_PER_BUS) ||
+           (function == TAPER_MESSAGE_CTRL_STATUS && node == TAPER_NODE_CONTROLLER);
+}
+
+static void set_curve(taper_station_t *station) {
+    const taper_status_t status = taper_limits_set_curve(&station->limits, &station->incoming_curve);
+    taper_transfers_answer(&station->transfers, status == TAPER_OK ? TAPER_ANSWER_ACCEPTED : TAPER_ANSWER_CONTENT,
+                           station->events.now_ms);
+    if (status == TAPER_OK) {
+        taper_station_count(station, TAPER_COUNTER_TRANSFERS);
+        taper_event_note(&station->events, TAPER_EVENT_CURVE_SET, 0, TAPER_NODE_GATEWAY,
+                         station->incoming_curve.count);
+    } else {
+        taper_station_count(station, TAPER_COUNTER_TRANSFERS_REFUSED);
+    }
+}
+
+static void take_transfer(taper_station_t *station, const taper_frame_t *frame) {
+    const uint32_t now_ms = station->events.now_ms;
+    const taper_transfer_scene_t scene = {.now_ms = now_ms,
+                                          .clock_is_set = station->sessions.clock_heard.heard,
+                                          .unix_s = taper_session_unix_s(&station->sessions, now_ms),
+                                          .time_scale = station->sessions.time_scale,
+                                          .events = &station->events};
+    uint8_t connector = 0;
+    switch (taper_transfers_take(&station->transfers, frame, &scene, &station->incoming_curve, &connector)) {
+    case TAPER_RESULT_CURVE: set_curve(station); break;
+    case TAPER_RESULT_IDENTIFIER: taper_station_count(station, TAPER_COUNTER_TRANSFERS); break;
+    case TAPER_RESULT_REFUSED:
+        taper_station_count(station, TAPER_COUNTER_TRANSFERS_REFUSED);
+        taper_event_note(&station->events, TAPER_EVENT_TRANSFER_REFUSED, frame->bus, (uint8_t)(frame->id & 0x3Fu), 0);
+        break;
+    case TAPER_RESULT_NONE:
+    default: break;
+    }
+}
+
+static void take_report(taper_station_t *station, const taper_frame_t *frame) {
+    sender_t sender;
+    taper_message_t message;
+    bool bad_field = false;
+    if (!find_sender(station, frame, &sender)) {
+        taper_station_count(station, TAPER_COUNTER_FRAMES_UNKNOWN);
+        return;
+    }
+    const uint32_t most_per_second = TOO_MUCH * (sender.connector < 0 ? GATEWAY_NOMINAL : CONNECTOR_NOMINAL);
+    if (!taper_node_guard_passes(station, sender.guard, most_per_second, frame) ||
+        !is_good(station, sender.receiver, frame)) {
+        return;
+    }
+    const bool usable = taper_decode(frame, &message, &bad_field);
+    if (!usable || bad_field) {
+        note_bad_field(station, &sender, frame);
+    }
+    if (usable) {
+        use_message(station, &sender, &message, frame->time_ms);
+    }
+}
+
+static void take_frame(taper_station_t *station, const taper_frame_t *frame) {
+    taper_station_count(station, TAPER_COUNTER_FRAMES_RECEIVED);
+    if ((unsigned)frame->id >> 6 == TAPER_MESSAGE_ISOTP_FROM) {
+        take_transfer(station, frame);
+    } else if (is_ours_to_send(frame)) {
+        hear_rival(station, frame);
+    } else {
+        take_report(station, frame);
+    }
+}
+
+void taper_station_receive(taper_station_t *station, uint32_t now_ms) {
+    const taper_port_t *port = station->options.port;
+    /* A port that does not know when a frame came leaves the time alone: then it came now. */
+    taper_frame_t frame = {.time_ms = now_ms};
+    for (uint32_t taken = 0; taken < MAX_FRAMES && port->receive(port->context, &frame); taken++) {
+        if (taper_time_reached(frame.time_ms, now_ms)) {
+            frame.time_ms = now_ms;
+        }
+        take_frame(station, &frame);
+        frame.time_ms = now_ms;
+    }
+}

@@ -1,0 +1,150 @@
+/* Frames out: setpoints, status, what is for display, and transfers. */
+#include "station_internal.h"
+#include "taper/codec.h"
+
+/** Least validity of a setpoint, and how many control ticks it must outlive. */
+#define VALIDITY_FLOOR_ms 3000u
+#define VALIDITY_TICKS    3u
+/** Longest that SETPOINT can say. */
+#define VALIDITY_MOST_ms 127000u
+/** PLAN goes round all connectors in this many seconds. */
+#define PLAN_ROUND_s 8u
+
+_Static_assert(VALIDITY_FLOOR_ms > 4u * TAPER_SETPOINT_CYCLE_ms, "a setpoint outlives the loss of some frames");
+
+uint32_t taper_station_validity_ms(const taper_station_options_t *options) {
+    const uint32_t tick_ms = options->config->tick_ms / options->time_scale;
+    const uint32_t validity_ms = tick_ms < VALIDITY_MOST_ms ? tick_ms * VALIDITY_TICKS : VALIDITY_MOST_ms;
+    if (validity_ms > VALIDITY_MOST_ms) {
+        return VALIDITY_MOST_ms;
+    }
+    return validity_ms < VALIDITY_FLOOR_ms ? VALIDITY_FLOOR_ms : validity_ms;
+}
+
+bool taper_station_send_message(taper_station_t *station, const taper_message_t *message, uint8_t *counter,
+                                uint32_t now_ms) {
+    taper_frame_t frame;
+    if (!taper_encode(message, &frame)) {
+        return false;
+    }
+    taper_e2e_protect(&frame, *counter);
+    if (!taper_bus_guard_send(station, &frame, now_ms)) {
+        return false;
+    }
+    *counter = (uint8_t)((*counter + 1) & 0x0F);
+    return true;
+}
+
+static taper_message_t setpoint_of(const taper_station_t *station, uint8_t i) {
+    const taper_connector_config_t *connector = &station->options.config->connectors[i];
+    const int32_t current_mA = station->setpoints.current_mA[i];
+    return (taper_message_t){
+        .kind = TAPER_MESSAGE_SETPOINT,
+        .bus = connector->bus,
+        .node = connector->node,
+        .as.setpoint =
+            {
+                .command = current_mA > 0 ? TAPER_COMMAND_CHARGE : TAPER_COMMAND_PAUSE,
+                .current_mA = current_mA,
+                .validity_ms = (int32_t)station->ledger.validity_ms,
+                .fallback_mA = 0,
+                .phase_mask = connector->phases == 3 ? 7 : 1,
+                .session = station->setpoint_session[i],
+            },
+    };
+}
+
+/** One setpoint, noted in the ledger before anybody can act on it. What was refused is tried again with the newest value. */
+static void send_setpoint(taper_station_t *station, uint8_t i, uint32_t now_ms) {
+    const uint8_t counter = station->setpoint_counter[i];
+    const taper_message_t message = setpoint_of(station, i);
+    if (!taper_ledger_can_send(&station->ledger, i, counter)) {
+        return;
+    }
+    if (taper_station_send_message(station, &message, &station->setpoint_counter[i], now_ms)) {
+        taper_ledger_sent(&station->ledger, i, counter, station->setpoints.current_mA[i], now_ms);
+        station->setpoint_due[i] = false;
+        station->setpoint_ms[i] = now_ms;
+    }
+}
+
+void taper_station_send_setpoints(taper_station_t *station, uint32_t now_ms) {
+    for (uint8_t i = 0; i < station->options.config->connector_count; i++) {
+        const bool stale = taper_elapsed_ms(now_ms, station->setpoint_ms[i]) >= TAPER_SETPOINT_CYCLE_ms;
+        if (station->setpoint_due[i] || stale) {
+            send_setpoint(station, i, now_ms);
+        }
+    }
+}
+
+static taper_ctrl_status_t status_of(const taper_station_t *station) {
+    taper_ctrl_status_t status = {
+        .mode = (uint8_t)station->supervisor.mode,
+        .verdict = (uint8_t)station->planner.verdict,
+        .limit_source = (uint8_t)station->limit_now.source,
+        .solve_ticks = station->planner.slices,
+        .iterations = taper_planner_iterations(&station->planner),
+        .plan_version = (uint8_t)taper_station_counter(station, TAPER_COUNTER_PLANS),
+    };
+    for (uint8_t i = 0; i < station->snapshot.count; i++) {
+        const bool active = station->snapshot.demand[i].active;
+        status.active = (uint8_t)(status.active + (active ? 1 : 0));
+        status.waiting =
+            (uint8_t)(status.waiting + (active && station->setpoints.current_mA[i] == 0 ? 1 : 0));
+    }
+    return status;
+}
+
+void taper_station_send_status(taper_station_t *station, uint32_t now_ms) {
+    taper_message_t message = {.kind = TAPER_MESSAGE_CTRL_STATUS, .node = TAPER_NODE_CONTROLLER};
+    message.as.ctrl_status = status_of(station);
+    const uint8_t buses = taper_station_buses(station->options.config);
+    for (message.bus = 0; message.bus < buses; message.bus++) {
+        (void)taper_station_send_message(station, &message, &station->status_counter[message.bus], now_ms);
+    }
+}
+
+static void send_plan(taper_station_t *station, uint8_t i, uint32_t now_ms) {
+    const taper_connector_config_t *connector = &station->options.config->connectors[i];
+    const taper_demand_t *demand = &station->snapshot.demand[i];
+    taper_message_t message = {.kind = TAPER_MESSAGE_PLAN, .bus = connector->bus, .node = connector->node};
+    const bool planned = taper_station_has_plan(station) && demand->active && station->plan_session[i] == demand->session;
+    message.as.plan.reason = (uint8_t)taper_station_reason(station, i);
+    for (uint8_t t = 0; t < TAPER_PLAN_STEPS; t++) {
+        message.as.plan.power_W[t] = planned ? station->plan_W[t][i] : TAPER_ABSENT;
+    }
+    (void)taper_station_send_message(station, &message, &station->plan_counter[i], now_ms);
+}
+
+static void send_diag(taper_station_t *station, uint32_t now_ms) {
+    taper_message_t message = {.kind = TAPER_MESSAGE_CTRL_DIAG, .node = TAPER_NODE_CONTROLLER};
+    const uint8_t index = station->next_diag;
+    station->next_diag = (uint8_t)((index + 1) % TAPER_COUNTERS);
+    message.as.ctrl_diag =
+        (taper_ctrl_diag_t){.index = index, .value = taper_station_counter(station, (taper_counter_t)index)};
+    const uint8_t buses = taper_station_buses(station->options.config);
+    for (message.bus = 0; message.bus < buses; message.bus++) {
+        (void)taper_station_send_message(station, &message, &station->diag_counter[message.bus], now_ms);
+    }
+}
+
+void taper_station_send_display(taper_station_t *station, uint32_t now_ms) {
+    const uint8_t connectors = station->options.config->connector_count;
+    if (taper_elapsed_ms(now_ms, station->second_ms) < TAPER_PLAN_CYCLE_ms) {
+        return;
+    }
+    station->second_ms = now_ms;
+    for (uint8_t k = 0; k < (connectors + PLAN_ROUND_s - 1u) / PLAN_ROUND_s; k++) {
+        send_plan(station, station->next_plan, now_ms);
+        station->next_plan = (uint8_t)((station->next_plan + 1) % connectors);
+    }
+    send_diag(station, now_ms);
+}
+
+void taper_station_send_transfers(taper_station_t *station, uint32_t now_ms) {
+    taper_frame_t frame;
+    while (taper_transfers_next(&station->transfers, now_ms, &frame) &&
+           taper_bus_guard_send(station, &frame, now_ms)) {
+        taper_transfers_sent(&station->transfers, &frame, now_ms);
+    }
+}

@@ -1,0 +1,80 @@
+/** Private to the app layer: the parts of the station's pipeline. Each takes the station and the time of the call. */
+#ifndef TAPER_STATION_INTERNAL_H
+#define TAPER_STATION_INTERNAL_H
+
+#include "taper/station.h"
+
+static inline void taper_station_count(taper_station_t *station, taper_counter_t counter) {
+    taper_count(&station->counters.count[counter]);
+}
+
+/* receive.c */
+
+/** Drain the port's receive queue into session table, limits, ledger and transfers. */
+void taper_station_receive(taper_station_t *station, uint32_t now_ms);
+
+/* node_guard.c: babbling nodes, row 16 */
+
+/** Whether a frame of a node is within three times the node's nominal rate, and the node is not babbling. */
+bool taper_node_guard_passes(taper_station_t *station, taper_node_guard_t *guard, uint32_t per_second,
+                             const taper_frame_t *frame);
+
+/* plan_slice.c */
+
+/** One slice of planning: start a problem if one is due, work on the one under way, keep the result. */
+void taper_station_plan(taper_station_t *station, int32_t site_limit_W);
+
+/** Whether there is a plan to follow now. */
+bool taper_station_has_plan(const taper_station_t *station);
+
+/** The plan as a proposal. */
+void taper_station_propose_plan(taper_station_t *station);
+
+/* bus_guard.c: bus-off and blocked senders, rows 17 and 18 */
+
+/** Look after all buses: go silent, restart, come back. */
+void taper_bus_guard_update(taper_station_t *station, uint32_t now_ms);
+
+/** Hand a frame to the port, unless its bus is to be left alone. @return whether the port took it. */
+bool taper_bus_guard_send(taper_station_t *station, const taper_frame_t *frame, uint32_t now_ms);
+
+/** Buses that the station's description uses. */
+uint8_t taper_station_buses(const taper_station_config_t *config);
+
+/* send.c */
+
+/** Validity of every setpoint: three control ticks, within what the wire can say. */
+uint32_t taper_station_validity_ms(const taper_station_options_t *options);
+
+/** Send the setpoints that are due, and those that were not repeated for half a second. */
+void taper_station_send_setpoints(taper_station_t *station, uint32_t now_ms);
+
+/** CTRL_STATUS on every bus. */
+void taper_station_send_status(taper_station_t *station, uint32_t now_ms);
+
+/** Once a second: PLAN of some connectors, and one counter. */
+void taper_station_send_display(taper_station_t *station, uint32_t now_ms);
+
+/** Frames of transfers under way. */
+void taper_station_send_transfers(taper_station_t *station, uint32_t now_ms);
+
+/** Encode, protect and send one message. `*counter` moves on only when the port took it: a frame that was never sent
+    leaves no gap. @return whether it did. */
+bool taper_station_send_message(taper_station_t *station, const taper_message_t *message, uint8_t *counter,
+                                uint32_t now_ms);
+
+/* alarm.c */
+
+/** A condition that others should know of is there at `now_ms`: EMCY at once, thrice, then every second while it lasts. */
+void taper_alarm_raise(taper_station_t *station, taper_event_code_t code, uint8_t bus, uint8_t node,
+                       uint32_t now_ms);
+
+/** Send what is due, and forget what was not raised again. */
+void taper_alarm_update(taper_station_t *station, uint32_t now_ms);
+
+/* record.c: what survives a restart, rows 29 and 30 */
+
+void taper_record_load(taper_station_t *station);
+void taper_record_update(taper_station_t *station, uint32_t now_ms);
+
+#endif
