@@ -113,10 +113,11 @@ static void draw_power(world_t *world, int64_t now_s) {
 /** Take note of a solve that the station finished in this tick. */
 static void note_solve(world_t *world) {
     const taper_station_t *station = &world->station;
-    if (station->counters.plans == world->plans) {
+    const uint32_t plans = taper_station_counter(station, TAPER_COUNTER_PLANS);
+    if (plans == world->plans) {
         return;
     }
-    world->plans = station->counters.plans;
+    world->plans = plans;
     sim_samples_add(&world->results->iterations, taper_planner_iterations(&station->planner));
     sim_samples_add(&world->results->solve_ms, station->last_solve_us / 1000.0);
     if (world->run->problems != NULL &&
@@ -187,9 +188,9 @@ bool sim_world_run(const sim_case_t *run, sim_results_t *results) {
                 run->station->name);
     }
     sim_queue_finish(&world->queue);
-    results->solves = world->station.counters.plans;
-    results->fallback_ticks = world->station.counters.fallback_ticks;
-    results->guard_violations = world->station.counters.guard_violations;
+    results->solves = taper_station_counter(&world->station, TAPER_COUNTER_PLANS);
+    results->fallback_ticks = taper_station_counter(&world->station, TAPER_COUNTER_FALLBACK_TICKS);
+    results->guard_violations = taper_station_counter(&world->station, TAPER_COUNTER_GUARD_VIOLATIONS);
     sim_queue_free(&world->queue);
     free(world);
     return good;
