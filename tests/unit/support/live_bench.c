@@ -106,6 +106,8 @@ static void tend_station(void) {
     } else if (taper_time_reached(live.now_ms, live.next_tick_ms)) {
         taper_station_step(&live.station, live.now_ms);
         live.next_tick_ms += live.config.tick_ms / live.field.options.time_scale;
+    } else {
+        taper_station_poll(&live.station, live.now_ms);
     }
 }
 
@@ -119,6 +121,7 @@ static double power_kw(void) {
 
 void live_bench_run_ms(uint32_t ms) {
     for (uint32_t passed = 0; passed < ms; passed += LIVE_POLL_ms) {
+        taper_membus_set_time(&live.bus, live.now_ms);
         tend_station();
         sim_field_poll(&live.field, live.now_ms);
         live.drawn_kwh += power_kw() * live.field.options.time_scale * LIVE_POLL_ms / 3.6e6;

@@ -39,7 +39,8 @@ typedef struct {
     sim_outcome_t outcome[LIVE_SESSIONS];
     sim_limits_t constant_limit;
     uint32_t now_ms;
-    uint32_t next_tick_ms;
+    uint32_t
+        next_tick_ms; /**< of the station: a second of the bus for the stations here, whatever the time scale */
     double drawn_kwh; /**< integral of the power of all connectors, in the world's time */
 } live_bench_t;
 
@@ -57,7 +58,7 @@ void live_bench_start(const live_options_t *options, const sim_session_t *sessio
 /** Let time pass, a multiple of LIVE_POLL_ms. */
 void live_bench_run_ms(uint32_t ms);
 
-/** The station is gone: it hears and says nothing. Then a fresh one takes its place. */
+/** The station is gone: it hears and says nothing. Then a fresh one takes its place, with the store of the old one. */
 void live_bench_kill_station(void);
 void live_bench_revive_station(void);
 
