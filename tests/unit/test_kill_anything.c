@@ -16,9 +16,10 @@
 /* Without a station nobody lowers a current before it expires: to a new limit belongs the station's tick (1 s), and then
    the validity of the last setpoint (3 s), and what the polls of both sides take. */
 #define GRACE_ms 4200u
-/* Charging has resumed when this much is drawn again. Under 30 kW no more than seven of eight get their 4.14 kW, and who
-   was switched off stays so for five minutes, so not all of it can be asked for. */
-#define RESUMED_KW 15.0
+/* Charging has resumed when this much is drawn again. */
+#define RESUMED_KW 25.0
+/* The hub leaves a connector that was switched off so for five minutes; one kill after the other would leave none. */
+#define SWITCH_ms 5000u
 
 enum { STATION = 100 };
 
@@ -82,6 +83,8 @@ void setUp(void) {
     }
     options.grace_ms = GRACE_ms;
     live_bench_start(&options, sessions, VEHICLES);
+    live.config.min_on_ms = SWITCH_ms;
+    live.config.min_off_ms = SWITCH_ms;
     live_bench_run_ms(20000);
     random_state = 1;
 }
