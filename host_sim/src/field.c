@@ -31,8 +31,7 @@ void sim_field_free(sim_field_t *field) {
 }
 
 double sim_field_world_s(const sim_field_t *field) {
-    return field->options.world_start_s +
-           (double)field->options.time_scale * (double)field->now_ms / 1000.0;
+    return field->options.world_start_s + (double)field->options.time_scale * (double)field->now_ms / 1000.0;
 }
 
 bool sim_field_is_over(const sim_field_t *field) {

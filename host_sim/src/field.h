@@ -35,18 +35,20 @@
 /** All pointers are borrowed, and must outlive the field. */
 typedef struct {
     const taper_station_config_t *station;
-    const taper_port_t *port; /**< the field's end of the bus: `receive` and `send` are called, nothing else */
+    const taper_port_t
+        *port; /**< the field's end of the bus: `receive` and `send` are called, nothing else */
     const sim_sessions_t *sessions;
     sim_outcome_t *outcome;     /**< [sessions->count] */
     const sim_limits_t *limits; /**< NULL: the gateway sets no limit */
     const bool *closed;         /**< [connector_count] these connectors are not played; NULL: all are */
     double world_start_s;
-    uint32_t time_scale;       /**< 0 is 1 */
-    uint32_t vehicle_delay_ms; /**< on the bus's clock: from a change of the offer until the vehicle follows */
-    uint32_t grace_ms;         /**< for sim_tracker_init(); 0: SIM_GRACE_ms */
-    bool tells_taper;          /**< EV_PARAM_D is sent */
-    bool no_gateway;           /**< not played here: only the station's own limits can be held against then */
-    uint64_t seed;             /**< bits of it begin the end-to-end counters */
+    uint32_t time_scale; /**< 0 is 1 */
+    uint32_t
+        vehicle_delay_ms; /**< on the bus's clock: from a change of the offer until the vehicle follows */
+    uint32_t grace_ms;    /**< for sim_tracker_init(); 0: SIM_GRACE_ms */
+    bool tells_taper;     /**< EV_PARAM_D is sent */
+    bool no_gateway;      /**< not played here: only the station's own limits can be held against then */
+    uint64_t seed;        /**< bits of it begin the end-to-end counters */
 } sim_field_options_t;
 
 /** What a connector controller has beside sim_evse_t. */
@@ -62,9 +64,9 @@ typedef struct {
 
 typedef struct {
     sim_field_options_t options;
-    uint32_t last_ms;  /**< of the caller's clock, at the last poll */
-    int64_t now_ms;    /**< since the start; does not wrap */
-    int64_t queue_s;   /**< second of the world that the queue was brought to */
+    uint32_t last_ms; /**< of the caller's clock, at the last poll */
+    int64_t now_ms;   /**< since the start; does not wrap */
+    int64_t queue_s;  /**< second of the world that the queue was brought to */
     sim_evse_t evse[TAPER_MAX_CONNECTORS];
     sim_node_t node[TAPER_MAX_CONNECTORS];
     sim_queue_t queue;

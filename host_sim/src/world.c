@@ -85,7 +85,7 @@ static bool send_reports(world_t *world, int64_t now_s) {
                                            : sim_fleet_report(&world->fleet, node);
         sent = sent && ok;
     }
-    return sent;
+    return sent && world->bus.to_station.overflows == 0;
 }
 
 /** The vehicles take what they may, and it is all written down. */
@@ -214,8 +214,7 @@ bool sim_world_run(const sim_case_t *run, sim_results_t *results) {
     sim_queue_finish(&world->queue);
     results->solves = taper_station_counter(&world->station, TAPER_COUNTER_PLANS);
     results->fallback_ticks = taper_station_counter(&world->station, TAPER_COUNTER_FALLBACK_TICKS);
-    results->guard_violations =
-        taper_station_counter(&world->station, TAPER_COUNTER_GUARD_VIOLATIONS);
+    results->guard_violations = taper_station_counter(&world->station, TAPER_COUNTER_GUARD_VIOLATIONS);
     sim_queue_free(&world->queue);
     free(world);
     return good;
