@@ -10,13 +10,10 @@
 #include "problems.h"
 #include "progress.h"
 #include "queue.h"
+#include "setup.h"
 
 /** Power above a limit by less than this is rounding of doubles [kW]. */
 #define LIMIT_TOLERANCE_KW 1e-6
-/** A tick of this length or more has room for a whole solve; shorter ones work in slices. */
-#define LONG_TICK_S      10
-#define SLICE_ITERATIONS 50
-#define SOLVE_ITERATIONS TAPER_MAX_ITERATIONS
 
 typedef struct {
     const sim_case_t *run;
@@ -63,7 +60,7 @@ static bool init_station(world_t *world) {
         .port = &world->port,
         .solver = plans ? run->solver : NULL,
         .policy = plans ? NULL : &world->policy,
-        .iterations_per_tick = world->tick_s >= LONG_TICK_S ? SOLVE_ITERATIONS : SLICE_ITERATIONS,
+        .iterations_per_tick = taper_setup_iterations(run->station->tick_ms),
     };
     return taper_station_init(&world->station, &options) == TAPER_OK;
 }
