@@ -83,7 +83,8 @@ static void put_line(taper_log_level_t level, uint32_t age_ms, const char *event
     used += snprintf(line + used, sizeof line - (size_t)used, "ts=%s level=%s event=%s%s", when,
                      levels[level].name, event, format[0] == '\0' ? "" : " ");
     used += vsnprintf(line + used, sizeof line - (size_t)used, format, values);
-    const size_t length = used < LINE - 1 ? (size_t)used : LINE - 2;
+    size_t length = used < LINE - 1 ? (size_t)used : LINE - 2;
+    length -= line[length - 1] == ' ' ? 1 : 0; // nothing more to say
     line[length] = '\n';
     put(line, length + 1);
 }

@@ -11,7 +11,7 @@
 #include "taper/stations.h"
 
 /** A log that is not the station's own tells when a frame was on the bus: so long after its call, or before, by a guess. */
-#define LATE_ms  250
+#define LATE_ms  900
 #define EARLY_ms 20
 
 typedef struct {

@@ -5,6 +5,7 @@
 
 #include "memory.h"
 #include "setup.h"
+#include "taper/bus.h"
 
 #define US_PER_MS 1000
 /** A frame may seem to be sent so long before its call: what the first guess of the grid is wrong by, and drift. */
@@ -13,6 +14,9 @@
 #define SURROUNDINGS 16
 /** Sent frames of one call follow each other closer than this. */
 #define TRAIN_us 6000
+/** Setpoints to one connector, of one call of a stop and the next: about 50 ms apart. No others follow so fast. */
+#define STOP_LEAST_us 15000
+#define STOP_MOST_us  85000
 
 static const sim_replay_frame_t *first_status(const sim_replay_log_t *log) {
     for (size_t i = 0; i < log->count; i++) {
@@ -159,40 +163,29 @@ static void set_guessed(sim_replay_log_t *log, uint64_t first_us, uint32_t tick_
     free(lag_us);
 }
 
-/** Frames that were sent close together. */
-typedef struct {
-    size_t first; // index in the log
-    uint64_t time_us;
-    bool has_status;
-} burst_t;
-
-/** The last bursts of the log. @return whether there are so many. */
-static bool last_bursts(const sim_replay_log_t *log, burst_t burst[TAPER_SETUP_STOPS]) {
-    burst_t *last = &burst[TAPER_SETUP_STOPS - 1];
-    size_t found = 0;
-    uint64_t before_us = 0;
-    for (size_t i = 0; i < log->count; i++) {
+/** Where the first connector's last setpoints stand in the log. @return whether there are so many. */
+static bool last_setpoints(const sim_replay_log_t *log, size_t at[TAPER_SETUP_STOPS]) {
+    const uint16_t id = TAPER_MESSAGE_SETPOINT << 6 | 1;
+    unsigned found = TAPER_SETUP_STOPS;
+    for (size_t i = log->count; i-- > 0 && found > 0;) {
         const sim_replay_frame_t *frame = &log->frame[i];
-        if (!frame->sent) {
-            continue;
+        if (frame->sent && frame->frame.id == id && frame->frame.bus == 0) {
+            at[--found] = i;
         }
-        if (found == 0 || frame->time_us - before_us > TRAIN_us) {
-            memmove(burst, burst + 1, (TAPER_SETUP_STOPS - 1) * sizeof *burst);
-            *last = (burst_t){.first = i, .time_us = frame->time_us};
-            found++;
-        }
-        last->has_status = last->has_status || sim_replay_is_status(&frame->frame);
-        before_us = frame->time_us;
     }
-    return found >= TAPER_SETUP_STOPS;
+    return found == 0;
 }
 
-/** Whether the last bursts are those of a stop: at their own distance, and no end of a tick. */
-static bool is_stop(const burst_t burst[TAPER_SETUP_STOPS]) {
-    const uint64_t apart_us = (uint64_t)TAPER_SETUP_STOP_ms * US_PER_MS;
-    for (unsigned i = 0; i < TAPER_SETUP_STOPS; i++) {
-        const uint64_t us = i == 0 ? apart_us : burst[i].time_us - burst[i - 1].time_us;
-        if (burst[i].has_status || us + TRAIN_us < apart_us || us > apart_us + TRAIN_us) {
+/** Whether these are the calls of a stop: at their own distance, and no control tick after them. */
+static bool is_stop(const sim_replay_log_t *log, const size_t at[TAPER_SETUP_STOPS]) {
+    for (unsigned i = 1; i < TAPER_SETUP_STOPS; i++) {
+        const uint64_t apart_us = log->frame[at[i]].time_us - log->frame[at[i - 1]].time_us;
+        if (apart_us < STOP_LEAST_us || apart_us > STOP_MOST_us) {
+            return false;
+        }
+    }
+    for (size_t i = at[0]; i < log->count; i++) {
+        if (log->frame[i].sent && sim_replay_is_status(&log->frame[i].frame)) {
             return false;
         }
     }
@@ -200,16 +193,16 @@ static bool is_stop(const burst_t burst[TAPER_SETUP_STOPS]) {
 }
 
 static void find_stop(sim_replay_log_t *log) {
-    burst_t burst[TAPER_SETUP_STOPS] = {0};
+    size_t at[TAPER_SETUP_STOPS] = {0};
     log->stop_ms = UINT64_MAX;
-    if (!last_bursts(log, burst) || !is_stop(burst)) {
+    if (!last_setpoints(log, at) || !is_stop(log, at)) {
         return;
     }
     log->stop_ms =
-        log->exact ? log->frame[burst[0].first].time_ms : (burst[0].time_us - log->start_us) / US_PER_MS;
+        log->exact ? log->frame[at[0]].time_ms : (log->frame[at[0]].time_us - log->start_us) / US_PER_MS;
     unsigned call = 0;
-    for (size_t i = burst[0].first; i < log->count; i++) {
-        if (call + 1 < TAPER_SETUP_STOPS && i >= burst[call + 1].first) {
+    for (size_t i = at[0]; i < log->count; i++) {
+        if (call + 1 < TAPER_SETUP_STOPS && i >= at[call + 1]) {
             call++;
         }
         if (log->frame[i].sent) {
