@@ -10,13 +10,9 @@
 #include "problems.h"
 #include "progress.h"
 #include "queue.h"
+#include "setup.h"
 #include "taper/membus.h"
 #include "tracker.h"
-
-/** A tick of this length or more has room for a whole solve; shorter ones work in slices. */
-#define LONG_TICK_S      10
-#define SLICE_ITERATIONS 50
-#define SOLVE_ITERATIONS TAPER_MAX_ITERATIONS
 
 /** A decrease pays for an increase in the next round; more than a few are not needed. */
 #define HAND_OVER_ROUNDS 6
@@ -67,7 +63,7 @@ static bool init_station(world_t *world) {
         .port = &world->port,
         .solver = plans ? run->solver : NULL,
         .policy = plans ? NULL : &world->policy,
-        .iterations_per_tick = world->tick_s >= LONG_TICK_S ? SOLVE_ITERATIONS : SLICE_ITERATIONS,
+        .iterations_per_tick = taper_setup_iterations(run->station->tick_ms),
     };
     return taper_station_init(&world->station, &options) == TAPER_OK;
 }
