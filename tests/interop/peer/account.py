@@ -127,25 +127,31 @@ class Account:
         self.connectors: dict[int, Connector] = {}
         self.violations: list[Violation] = []
         self.worst_margin_W = float("inf")
+        self._power_W: dict[int, float] = {}
         self._sum_W = 0.0
-        self._sum_until_s = 0.0
+        self._sum_until_s = float("inf")
         self._violating = False
 
     def connector(self, node: int) -> Connector:
-        """To be changed: the sum is taken anew at the next check."""
-        self._sum_until_s = 0.0
+        """Whoever changes it says so with changed()."""
         return self.connectors.setdefault(node, Connector())
+
+    def changed(self, now_s: float, node: int) -> None:
+        connector = self.connectors[node]
+        power_W = connector.power_W(now_s)
+        self._sum_W += power_W - self._power_W.get(node, 0.0)
+        self._power_W[node] = power_W
+        self._sum_until_s = min(self._sum_until_s, connector.next_change_s(now_s))
 
     def may_draw_W(self, now_s: float) -> float:
         if now_s >= self._sum_until_s:
-            all_of_them = self.connectors.values()
-            self._sum_W = sum(connector.power_W(now_s) for connector in all_of_them)
-            self._sum_until_s = min((connector.next_change_s(now_s) for connector in all_of_them),
-                                    default=float("inf"))
+            self._power_W = {node: connector.power_W(now_s) for node, connector in self.connectors.items()}
+            self._sum_W = sum(self._power_W.values())
+            self._sum_until_s = min(connector.next_change_s(now_s) for connector in self.connectors.values())
         return self._sum_W
 
-    def check(self, now_s: float, what: str) -> None:
-        """`what` names the frame that has just been heard."""
+    def check(self, now_s: float, name: str, can_id: int, data: bytes) -> None:
+        """The frame is the one that has just been heard; it stands in the reason."""
         self.limit.settle(now_s)
         allowed_W = self.limit.allowed_W(now_s)
         margin_W = allowed_W - self.may_draw_W(now_s)
@@ -156,7 +162,8 @@ class Account:
         if not self._violating:
             self._violating = True
             amperes = {node: round(connector.current_A(now_s), 1) for node, connector in self.connectors.items()}
-            self.violations.append(Violation(now_s, now_s, 0, 0.0, allowed_W, f"since {what}", amperes))
+            reason = f"since {name} {can_id:03X} {bytes(data).hex(' ')}"
+            self.violations.append(Violation(now_s, now_s, 0, 0.0, allowed_W, reason, amperes))
         present = self.violations[-1]
         present.end_s = now_s
         present.frames += 1

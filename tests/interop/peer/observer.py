@@ -35,7 +35,7 @@ class Observer:
         used = name is not None and self._sound(now_s, can_id, data)
         if used and name in self._handlers:
             self._handlers[name](now_s, node, data)
-        self.account.check(now_s, f"{name or 'unknown'} {can_id:03X} {bytes(data).hex(' ')}")
+        self.account.check(now_s, name or "unknown", can_id, data)
         return (name, node) if used else None
 
     def _sound(self, now_s: float, can_id: int, data: bytes) -> bool:
@@ -60,6 +60,7 @@ class Observer:
             return  # a connector refuses the whole frame
         self.account.connector(node).setpoint(now_s, data[1] & 0x0F, current_A if command == COMMAND_CHARGE else 0.0,
                                               validity_s, fallback_A)
+        self.account.changed(now_s, node)
 
     def _status(self, now_s: float, node: int, data: bytes) -> None:
         pilot, echo, phases, present = self.wire.read(
@@ -67,10 +68,12 @@ class Observer:
         if pilot is not None:
             vehicle = bool(present) and pilot not in PILOT_STATES_WITHOUT_VEHICLE
             self.account.connector(node).status(echo, vehicle, phases)
+            self.account.changed(now_s, node)
 
     def _info(self, now_s: float, node: int, data: bytes) -> None:
         (kind,) = self.wire.read("EVSE_INFO", data, "kind")
         self.account.connector(node).kind = kind
+        self.account.changed(now_s, node)
 
     def _site_limit(self, now_s: float, node: int, data: bytes) -> None:
         if node == GATEWAY_NODE:
