@@ -1,7 +1,6 @@
-"""Generates the CAN codec from the database, without floating point and without what changes from run to run."""
+"""Generates the CAN codec from a database, without floating point and without what changes from run to run."""
 
 import re
-from pathlib import Path
 
 import cantools
 from cantools.database.can import Database
@@ -19,9 +18,9 @@ class CantoolsChanged(Exception):
     """cantools' output is not what this generator was written for."""
 
 
-def codec_files(database: Path) -> dict[str, str]:
-    """Files of dbc/ by name."""
-    loaded = cantools.database.load_file(database, database_format="dbc")
+def codec_files(database: str) -> dict[str, str]:
+    """Files that pack and unpack the messages of `database`, the text of a DBC file, by name."""
+    loaded = cantools.database.load_string(database, database_format="dbc")
     assert isinstance(loaded, Database)
     header, source, _, _ = generate(loaded, NAME, f"{NAME}.h", f"{NAME}.c", "", floating_point_numbers=False)
     files = {f"{NAME}.h": _PHYSICAL_RANGE_PROTOTYPE.sub("", header), f"{NAME}.c": _PHYSICAL_RANGE.sub("", source)}

@@ -76,7 +76,7 @@ class Station:
 
 
 def read_station(path: Path, shown: str | None = None) -> Station:
-    """The station in the file at `path`; raises StationError, whose text calls the file `shown`."""
+    """The station in the file at `path`; raises TomlError, whose text calls the file `shown`."""
     root = load(path, shown or str(path))
     name = _name(root, path.stem)
     description = root.string("description")

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 
-class StationError(Exception):
-    """A station file that cannot be used. Its text is the line for the user."""
+class TomlError(Exception):
+    """A file that cannot be used. Its text is the line for the user."""
 
     def __init__(self, file: str, key: str, reason: str) -> None:
         super().__init__(f"{file}: {key}: {reason}")
@@ -37,22 +37,22 @@ def load(path: Path, shown: str) -> "Table":
     try:
         text = path.read_bytes().decode("utf-8")
     except OSError as error:
-        raise StationError(shown, "file", error.strerror or "cannot be read") from None
+        raise TomlError(shown, "file", error.strerror or "cannot be read") from None
     except UnicodeDecodeError as error:
         line = error.object[: error.start].count(b"\n") + 1
-        raise StationError(shown, f"line {line}", "not UTF-8") from None
+        raise TomlError(shown, f"line {line}", "not UTF-8") from None
     try:
         return Table(tomllib.loads(text.replace("\r\n", "\n")), shown)
     except tomllib.TOMLDecodeError as error:
         raise _syntax_error(shown, str(error), text) from None
 
 
-def _syntax_error(shown: str, message: str, text: str) -> StationError:
+def _syntax_error(shown: str, message: str, text: str) -> TomlError:
     """Moves the line number, which Python 3.11 gives only inside the message, into the key's place."""
     found = re.fullmatch(r"(.*) \(at line (\d+), column (\d+)\)", message, re.DOTALL)
     reason, line = (found[1], int(found[2])) if found else (message, text.count("\n") + 1)
     reason = re.sub(r" \(at end of document\)$", ", at the end of the file", reason)
-    return StationError(shown, f"line {line}", " ".join(reason.split()))
+    return TomlError(shown, f"line {line}", " ".join(reason.split()))
 
 
 class Table:
@@ -64,9 +64,9 @@ class Table:
         self._where = where
         self._known: set[str] = set()
 
-    def error(self, key: str, reason: str) -> StationError:
+    def error(self, key: str, reason: str) -> TomlError:
         """The error to raise for `key` of this table; an empty key is the table itself."""
-        return StationError(self._file, self._path(key), reason)
+        return TomlError(self._file, self._path(key), reason)
 
     def _path(self, key: str) -> str:
         shown = key if re.fullmatch(r"[A-Za-z0-9_-]*", key) else repr(key)
@@ -93,8 +93,18 @@ class Table:
         self._known.add(key)
         return key in self._values
 
-    def string(self, key: str) -> str:
-        return self._get(key, str)
+    def string(self, key: str, default: str | None = None) -> str:
+        return default if default is not None and not self.has(key) else self._get(key, str)
+
+    def boolean(self, key: str, default: bool) -> bool:
+        return self._get(key, bool) if self.has(key) else default
+
+    def strings(self, key: str) -> tuple[str, ...]:
+        """An array of different strings, at least one."""
+        values = self._get(key, list)
+        if not values or any(type(value) is not str for value in values) or len(set(values)) != len(values):
+            raise self.error(key, "must be an array of different strings, at least one")
+        return tuple(values)
 
     def integer(self, key: str, least: int, most: int) -> int:
         value = self._get(key, int)
@@ -131,6 +141,16 @@ class Table:
             if type(value) is not dict:
                 raise self.error(f"{key}[{number}]", f"must be a table, not {_kind_of(value)}")
         return [Table(value, self._file, f"{self._path(key)}[{n}]") for n, value in enumerate(values, 1)]
+
+    def named(self, key: str) -> dict[str, "Table"]:
+        """The tables `[key.NAME]`, at least one, in the file's order. Messages call each by its name alone."""
+        values = self._get(key, dict)
+        if not values:
+            raise self.error(key, "is empty")
+        for name, value in values.items():
+            if type(value) is not dict:
+                raise self.error(name, f"must be a table, not {_kind_of(value)}")
+        return {name: Table(value, self._file, self._path(name)) for name, value in values.items()}
 
     def end(self) -> None:
         """Refuses keys that nobody asked for: a misspelt optional key must not be dropped in silence."""

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 from conftest import ROOT, STATIONS, Run, content
 
-COMMON = {"include/taper/sizes.h", "include/taper/stations.h", "stations.c", "memory.txt"}
-CODEC = {"dbc/taper_dbc.c", "dbc/taper_dbc.h"}
+COMMON = {"include/taper/bus.h", "include/taper/sizes.h", "include/taper/stations.h", "stations.c", "memory.txt"}
+CODEC = {"dbc/taper_dbc.c", "dbc/taper_dbc.h", "dbc/taper_fields.h"}
 
 
 def test_the_same_input_gives_the_same_bytes(generate: Run, tree: Path, real: str, tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from conftest import STATIONS, Run, content
 from station import Station, read_station
-from toml_table import StationError
+from toml_table import TomlError
 
 GOOD = """\
 name = "x"
@@ -208,7 +208,7 @@ def read(folder: Path, text: str) -> Station:
 def test_a_mistake_gives_one_line_with_file_key_and_reason(mistake: str, tmp_path: Path) -> None:
     old, new, key, reason = MISTAKES[mistake]
     assert old in GOOD
-    with pytest.raises(StationError) as error:
+    with pytest.raises(TomlError) as error:
         read(tmp_path, GOOD.replace(old, new, 1))
     line = str(error.value)
     assert "\n" not in line
@@ -217,12 +217,12 @@ def test_a_mistake_gives_one_line_with_file_key_and_reason(mistake: str, tmp_pat
 
 def test_a_file_that_is_not_text_tells_the_line(tmp_path: Path) -> None:
     (tmp_path / "x.toml").write_bytes(b'name = "x"\ndescription = "\xff"\n')
-    with pytest.raises(StationError, match=r"^x: line 2: not UTF-8$"):
+    with pytest.raises(TomlError, match=r"^x: line 2: not UTF-8$"):
         read_station(tmp_path / "x.toml", "x")
 
 
 def test_a_missing_file_is_told(tmp_path: Path) -> None:
-    with pytest.raises(StationError, match=r"^x: file: No such file or directory$"):
+    with pytest.raises(TomlError, match=r"^x: file: No such file or directory$"):
         read_station(tmp_path / "x.toml", "x")
 
 

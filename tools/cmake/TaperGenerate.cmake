@@ -8,7 +8,7 @@ endif()
 set(TAPER_GENERATED ${CMAKE_BINARY_DIR}/generated)
 
 file(GLOB TAPER_CODEGEN_INPUTS CONFIGURE_DEPENDS
-    ${PROJECT_SOURCE_DIR}/codegen/*.py ${PROJECT_SOURCE_DIR}/codegen/*.dbc ${PROJECT_SOURCE_DIR}/codegen/stations/*.toml)
+    ${PROJECT_SOURCE_DIR}/codegen/*.py ${PROJECT_SOURCE_DIR}/codegen/*.toml ${PROJECT_SOURCE_DIR}/codegen/stations/*.toml)
 set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${TAPER_CODEGEN_INPUTS})
 
 function(taper_generate)

@@ -10,6 +10,7 @@ typedef enum {
     NODE_CONNECTOR,
     NODE_GATEWAY,
     NODE_CONTROLLER,
+    NODE_ANY, /* that speaks on the bus by itself: all of these */
 } node_class_t;
 
 typedef struct {
@@ -20,29 +21,35 @@ typedef struct {
 } route_t;
 
 static const route_t routes[] = {
+    {TAPER_MESSAGE_EMCY, NODE_ANY, taper_decode_emcy, taper_encode_emcy},
     {TAPER_MESSAGE_SITE_LIMIT, NODE_GATEWAY, taper_decode_site_limit, taper_encode_site_limit},
     {TAPER_MESSAGE_SETPOINT, NODE_CONNECTOR, taper_decode_setpoint, taper_encode_setpoint},
     {TAPER_MESSAGE_EVSE_STATUS, NODE_CONNECTOR, taper_decode_evse_status, taper_encode_evse_status},
     {TAPER_MESSAGE_EV_STATUS, NODE_CONNECTOR, taper_decode_ev_status, taper_encode_ev_status},
     {TAPER_MESSAGE_EVSE_ELEC, NODE_CONNECTOR, taper_decode_evse_elec, taper_encode_evse_elec},
+    {TAPER_MESSAGE_SITE_METER, NODE_GATEWAY, taper_decode_site_meter, taper_encode_site_meter},
     {TAPER_MESSAGE_TIME_SYNC, NODE_GATEWAY, taper_decode_time_sync, taper_encode_time_sync},
     {TAPER_MESSAGE_CTRL_STATUS, NODE_CONTROLLER, taper_decode_ctrl_status, taper_encode_ctrl_status},
     {TAPER_MESSAGE_EV_PARAM_A, NODE_CONNECTOR, taper_decode_ev_param_a, taper_encode_ev_param_a},
     {TAPER_MESSAGE_EV_PARAM_B, NODE_CONNECTOR, taper_decode_ev_param_b, taper_encode_ev_param_b},
     {TAPER_MESSAGE_EV_PARAM_C, NODE_CONNECTOR, taper_decode_ev_param_c, taper_encode_ev_param_c},
+    {TAPER_MESSAGE_EVSE_INFO, NODE_CONNECTOR, taper_decode_evse_info, taper_encode_evse_info},
+    {TAPER_MESSAGE_PLAN, NODE_CONNECTOR, taper_decode_plan, taper_encode_plan},
+    {TAPER_MESSAGE_CTRL_DIAG, NODE_CONTROLLER, taper_decode_ctrl_diag, taper_encode_ctrl_diag},
     {TAPER_MESSAGE_EV_PARAM_D, NODE_CONNECTOR, taper_decode_ev_param_d, taper_encode_ev_param_d},
 };
 
 static bool node_allowed(node_class_t node_class, unsigned node) {
     switch (node_class) {
     case NODE_CONNECTOR: return node >= 1 && node <= TAPER_NODES_PER_BUS;
+    case NODE_ANY: return node <= TAPER_NODES_PER_BUS || node == TAPER_NODE_GATEWAY;
     case NODE_GATEWAY: return node == TAPER_NODE_GATEWAY;
     case NODE_CONTROLLER: return node == TAPER_NODE_CONTROLLER;
     }
     return false;
 }
 
-/* NULL for a kind that the DBC does not have, or a node that it does not allow. */
+/* NULL for a kind that is not decoded here, or a node that it does not allow. */
 static const route_t *find_route(unsigned kind, unsigned node) {
     for (size_t i = 0; i < sizeof routes / sizeof routes[0]; i++) {
         if ((unsigned)routes[i].kind == kind) {

@@ -17,7 +17,7 @@ typedef enum {
 /** A field that has no code for "absent". Never a raw value: no field is wider than 16 bits. */
 #define TAPER_FIELD_ALWAYS INT32_MIN
 
-/** A number on the wire. Range and absent code repeat the DBC; a unit test holds the two together. */
+/** A number on the wire. */
 typedef struct {
     int32_t step;   /**< units per raw count */
     int32_t low;    /**< least raw value */
@@ -25,6 +25,8 @@ typedef struct {
     int32_t absent; /**< raw code for "absent", or TAPER_FIELD_ALWAYS */
     taper_rounding_t rounding;
 } taper_field_t;
+
+#include "taper_fields.h" /* generated: all fields, and which values have a name; needs the types above */
 
 /** What decoding found wrong so far. Starts all false. */
 typedef struct {
@@ -45,6 +47,7 @@ void taper_decode_site_limit(const uint8_t *data, taper_message_t *message, tape
 void taper_decode_setpoint(const uint8_t *data, taper_message_t *message, taper_decoding_t *decoding);
 void taper_decode_evse_status(const uint8_t *data, taper_message_t *message, taper_decoding_t *decoding);
 void taper_decode_evse_elec(const uint8_t *data, taper_message_t *message, taper_decoding_t *decoding);
+void taper_decode_site_meter(const uint8_t *data, taper_message_t *message, taper_decoding_t *decoding);
 void taper_decode_time_sync(const uint8_t *data, taper_message_t *message, taper_decoding_t *decoding);
 void taper_decode_ctrl_status(const uint8_t *data, taper_message_t *message, taper_decoding_t *decoding);
 void taper_decode_ev_status(const uint8_t *data, taper_message_t *message, taper_decoding_t *decoding);
@@ -52,12 +55,17 @@ void taper_decode_ev_param_a(const uint8_t *data, taper_message_t *message, tape
 void taper_decode_ev_param_b(const uint8_t *data, taper_message_t *message, taper_decoding_t *decoding);
 void taper_decode_ev_param_c(const uint8_t *data, taper_message_t *message, taper_decoding_t *decoding);
 void taper_decode_ev_param_d(const uint8_t *data, taper_message_t *message, taper_decoding_t *decoding);
+void taper_decode_emcy(const uint8_t *data, taper_message_t *message, taper_decoding_t *decoding);
+void taper_decode_evse_info(const uint8_t *data, taper_message_t *message, taper_decoding_t *decoding);
+void taper_decode_plan(const uint8_t *data, taper_message_t *message, taper_decoding_t *decoding);
+void taper_decode_ctrl_diag(const uint8_t *data, taper_message_t *message, taper_decoding_t *decoding);
 
 /** Each: @return false for an enumeration that the wire does not have. */
 bool taper_encode_site_limit(const taper_message_t *message, uint8_t *data);
 bool taper_encode_setpoint(const taper_message_t *message, uint8_t *data);
 bool taper_encode_evse_status(const taper_message_t *message, uint8_t *data);
 bool taper_encode_evse_elec(const taper_message_t *message, uint8_t *data);
+bool taper_encode_site_meter(const taper_message_t *message, uint8_t *data);
 bool taper_encode_time_sync(const taper_message_t *message, uint8_t *data);
 bool taper_encode_ctrl_status(const taper_message_t *message, uint8_t *data);
 bool taper_encode_ev_status(const taper_message_t *message, uint8_t *data);
@@ -65,5 +73,9 @@ bool taper_encode_ev_param_a(const taper_message_t *message, uint8_t *data);
 bool taper_encode_ev_param_b(const taper_message_t *message, uint8_t *data);
 bool taper_encode_ev_param_c(const taper_message_t *message, uint8_t *data);
 bool taper_encode_ev_param_d(const taper_message_t *message, uint8_t *data);
+bool taper_encode_emcy(const taper_message_t *message, uint8_t *data);
+bool taper_encode_evse_info(const taper_message_t *message, uint8_t *data);
+bool taper_encode_plan(const taper_message_t *message, uint8_t *data);
+bool taper_encode_ctrl_diag(const taper_message_t *message, uint8_t *data);
 
 #endif
