@@ -64,7 +64,7 @@ class Connector:
         """The frames to send now."""
         frames = []
         for name, period_s in PERIODS_S.items():
-            if name not in wire.function or (name in PARAMETERS and self.visit is None):
+            if name in PARAMETERS and self.visit is None:
                 continue
             values = self._values(name)
             changed = name == "EVSE_STATUS" and self._news(values) != self._told
