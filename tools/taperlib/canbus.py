@@ -7,7 +7,7 @@ from pathlib import Path
 
 import cantools
 
-from taperlib.files import InputError
+from taperlib.files import InputError, read_text
 
 GATEWAY_NODE = 62
 UNPROTECTED = ("ISOTP_TO", "ISOTP_FROM")
@@ -16,6 +16,8 @@ MOST_LOST = 3
 ERROR_FLAG = 0x20000000
 LONGEST_STANDARD_ID = 3  # hexadecimal digits
 NODE_SUFFIX = re.compile(r"_(\d\d|CTRL|GATEWAY)$")
+MESSAGE_LINE = re.compile(r"BO_ (\d+) ")
+DETAIL_LINE = re.compile(r'(?:VAL_|BA_ "\w+" (?:BO_|SG_)) (\d+) .*;\s*$')  # comments may have more lines, and stay
 LOG_LINE = re.compile(r"\((\d+\.\d+)\) (\S+) ([0-9A-Fa-f]{3,8})#(R?[0-9A-Fa-f]*)(?: [RT])?")
 
 Value = float | int | str | None
@@ -30,14 +32,30 @@ class Frame:
     is_error: bool = False
 
 
+def _one_of_each(dbc: str) -> str:
+    """The database with one message of each function, which is read ten times as fast as all."""
+    kept: dict[int, int] = {}
+    lines = []
+    dropping = False
+    for line in dbc.splitlines():
+        match = MESSAGE_LINE.match(line)
+        if match:
+            can_id = int(match[1])
+            dropping = kept.setdefault(can_id >> 6, can_id) != can_id
+        elif not line.startswith(" SG_"):
+            match = DETAIL_LINE.match(line)
+            dropping = match is not None and int(match[1]) not in kept.values()
+        if not dropping:
+            lines.append(line)
+    return "\n".join(lines)
+
+
 class Database:
     """The DBC. All nodes of a function have the same layout, so one message stands for all."""
 
     def __init__(self, path: Path):
         try:
-            messages = cantools.database.load_file(path).messages
-        except OSError as error:
-            raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+            messages = cantools.database.load_string(_one_of_each(read_text(path)), "dbc").messages
         except (cantools.database.Error, ValueError) as error:
             raise InputError(f"{path}: is not a CAN database: {str(error).splitlines()[0]}") from None
         self._of_function = {}

@@ -3,6 +3,7 @@
 import math
 import re
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import cantools
 
@@ -137,6 +138,21 @@ def _slot(signal) -> Slot:
                 high * signal.scale if signal.maximum is None else signal.maximum)
 
 
+def _shortened(dbc: str) -> str:
+    """The messages alone, and of those that differ only in the node the first: cantools needs a second for all 791."""
+    blocks = re.findall(r"^BO_ \d+ .*\n(?: SG_ .*\n)+", dbc, re.MULTILINE)
+    first_of_function: dict[int, str] = {}
+    for block in blocks:
+        first_of_function.setdefault(int(block.split()[1]) >> 6, block)
+    senders = sorted({name for block in first_of_function.values() for name in _nodes_of(block)})
+    return "\n".join(['VERSION ""', f"BU_: {' '.join(senders)}", "", *first_of_function.values()])
+
+
+def _nodes_of(block: str) -> set[str]:
+    lines = block.splitlines()
+    return {lines[0].split()[-1], *(node for line in lines[1:] for node in line.split('"')[-1].strip().split(","))}
+
+
 class Wire:
     """All messages of the DBC, by function: every node has the same layout."""
 
@@ -144,7 +160,7 @@ class Wire:
         self._slots: dict[str, dict[str, Slot]] = {}
         self.function: dict[str, int] = {}
         self.name: dict[int, str] = {}
-        for message in cantools.database.load_file(dbc, strict=False).messages:
+        for message in cantools.database.load_string(_shortened(Path(dbc).read_text()), "dbc").messages:
             function = message.frame_id >> 6
             if function in self.name or function in FUNCTIONS_WITHOUT_PROTECTION:
                 continue
