@@ -3,7 +3,7 @@
 from .vehicle import MINUTES_MODULO, VOLTAGE_V, Visit
 from .wire import Wire
 
-PERIODS_S = {"EVSE_STATUS": 0.2, "EV_STATUS": 0.5, "EVSE_ELEC": 1.0, "EV_PARAM_A": 2.0, "EV_PARAM_B": 2.0,
+PERIODS_S = {"EVSE_STATUS": 0.2, "EVSE_ELEC": 1.0, "EV_STATUS": 0.5, "EV_PARAM_A": 2.0, "EV_PARAM_B": 2.0,
              "EV_PARAM_C": 2.0, "EV_PARAM_D": 2.0, "EVSE_INFO": 5.0}
 PARAMETERS = ("EV_PARAM_A", "EV_PARAM_B", "EV_PARAM_C", "EV_PARAM_D")
 CHARGE, PAUSE = 1, 0
@@ -24,6 +24,7 @@ class Connector:
         self._expires_s: float | None = None
         self._fallback_active = False
         self._power_W = 0.0
+        self._metered = (0.0, 0.0)  # time and SOC at the last EVSE_ELEC
         self._stepped_s: float | None = None
         self._counter: dict[str, int] = {}
         self._due_s: dict[str, float] = {}
@@ -66,12 +67,14 @@ class Connector:
         for name, period_s in PERIODS_S.items():
             if name in PARAMETERS and self.visit is None:
                 continue
-            values = self._values(name)
+            values = self._values(name, now_s)
             changed = name == "EVSE_STATUS" and self._news(values) != self._told
             if not changed and now_s < self._due_s.get(name, 0.0):
                 continue
             if name == "EVSE_STATUS":
                 self._told = self._news(values)
+            elif name == "EVSE_ELEC":
+                self._metered = (now_s, self.visit.soc if self.visit else 0.0)
             self._due_s[name] = now_s + period_s
             self._counter[name] = (self._counter.get(name, -1) + 1) % 16
             frames.append(wire.frame(name, self.node, self._counter[name], values))
@@ -91,17 +94,19 @@ class Connector:
             self._session = self._session % SESSIONS + 1
             self.visit.session = self._session
             self._setpoint_A = self._fallback_A = 0.0  # what was told was for the vehicle before
+            self._due_s["EVSE_ELEC"] = self._due_s["EV_STATUS"] = 0.0
             self._departure_minute = None
             if world_zero_unix_s is not None:
                 self._departure_minute = int((world_zero_unix_s + self.visit.departure_s) // 60) % MINUTES_MODULO
             for name in PARAMETERS:
                 self._due_s[name] = 0.0
 
-    def _values(self, name: str) -> dict:
+    def _values(self, name: str, now_s: float) -> dict:
         if name in PARAMETERS:
             return self._parameters(name)
-        return {"EVSE_STATUS": self._status, "EV_STATUS": self._ev_status, "EVSE_ELEC": self._elec,
-                "EVSE_INFO": self._info}[name]()
+        if name == "EV_STATUS":
+            return self._ev_status(now_s)
+        return {"EVSE_STATUS": self._status, "EVSE_ELEC": self._elec, "EVSE_INFO": self._info}[name]()
 
     def _status(self) -> dict:
         visit = self.visit
@@ -113,12 +118,14 @@ class Connector:
                 "locked": int(visit is not None), "setpoint_echo": self._echo, "phases": phases,
                 "fallback_active": int(self._fallback_active), "ev_present": int(visit is not None)}
 
-    def _ev_status(self) -> dict:
+    def _ev_status(self, now_s: float) -> dict:
+        """The SOC is that of the last meter reading, with its age: sped up, half a second is several percent."""
         visit = self.visit
+        metered_s, soc = self._metered
         if visit is None:
             return {"soc": None, "soc_age": None, "max_current": None, "time_to_target": None}
         most_A = min(visit.max_kw * 1000 / (visit.phases * VOLTAGE_V), MAXIMUM_A)
-        return {"soc": visit.soc * 100, "soc_age": 0, "max_current": most_A, "time_to_target": None,
+        return {"soc": soc * 100, "soc_age": int(now_s - metered_s), "max_current": most_A, "time_to_target": None,
                 "complete": int(visit.complete), "ready": int(not visit.complete), "soc_source": 1}
 
     def _elec(self) -> dict:
