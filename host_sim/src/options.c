@@ -3,13 +3,10 @@
 #include "options.h"
 
 #include <argp.h>
-#include <errno.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "csv_table.h"
 #include "taper/stations.h"
 
 #define LONGEST_TICK_S 3600
@@ -61,26 +58,6 @@ static const struct argp_option options[] = {
     {0},
 };
 
-/** @return the index of a station, or taper_station_count. */
-static unsigned find_station(const char *name) {
-    unsigned i = 0;
-    while (i < taper_station_count && strcmp(taper_stations[i]->name, name) != 0) {
-        i++;
-    }
-    return i;
-}
-
-/** The names, separated by commas; for help and errors. To be freed. */
-static char *station_names(void) {
-    char *names = NULL;
-    size_t size = 0;
-    FILE *stream = open_memstream(&names, &size);
-    for (unsigned i = 0; stream != NULL && i < taper_station_count; i++) {
-        fprintf(stream, "%s%s", i == 0 ? "" : ", ", taper_stations[i]->name);
-    }
-    return stream != NULL && fclose(stream) == 0 ? names : NULL;
-}
-
 static char *policy_names(bool with_help) {
     char *names = NULL;
     size_t size = 0;
@@ -97,7 +74,7 @@ static char *policy_names(bool with_help) {
 /** Add the names that this program knows to the help. */
 static char *add_names(int key, const char *text, void *input) {
     (void)input;
-    char *names = key == KEY_POLICY ? policy_names(true) : key == KEY_STATION ? station_names() : NULL;
+    char *names = key == KEY_POLICY ? policy_names(true) : key == KEY_STATION ? sim_station_names() : NULL;
     char *longer = NULL;
     if (names != NULL && asprintf(&longer, "%s: %s", text, names) < 0) {
         longer = NULL;
@@ -113,37 +90,6 @@ static void set_policy(sim_options_t *chosen, const char *name, struct argp_stat
     }
 }
 
-static void set_station(sim_options_t *chosen, const char *name, struct argp_state *state) {
-    chosen->station = find_station(name);
-    if (chosen->station == taper_station_count) {
-        argp_error(state, "--station: unknown station '%s'; there are %s", name, station_names());
-    }
-}
-
-/** A number that is not negative. */
-static double not_negative(const char *option, const char *text, struct argp_state *state) {
-    double value = 0.0;
-    if (!sim_parse_number(text, &value)) {
-        argp_error(state, "%s: not a number: '%s'", option, text);
-    }
-    if (value < 0.0) {
-        argp_error(state, "%s: below 0: %s", option, text);
-    }
-    return fabs(value); // no -0
-}
-
-static uint64_t whole_number(const char *option, const char *text, uint64_t low, uint64_t high,
-                             struct argp_state *state) {
-    char *end = NULL;
-    errno = 0;
-    const uint64_t value = strtoull(text, &end, 10);
-    if (text[0] < '0' || text[0] > '9' || *end != '\0' || errno != 0 || value < low || value > high) {
-        argp_error(state, "%s: not a whole number in %llu..%llu: '%s'", option, (unsigned long long)low,
-                   (unsigned long long)high, text);
-    }
-    return value;
-}
-
 /** What can only be checked when all options are known. */
 static void check(const sim_options_t *chosen, struct argp_state *state) {
     if (chosen->sessions_file == NULL) {
@@ -157,7 +103,7 @@ static void check(const sim_options_t *chosen, struct argp_state *state) {
         argp_error(state, "--limit-kw and --limit-csv exclude each other");
     }
     if (chosen->station == taper_station_count) {
-        argp_error(state, "--station is needed: one of %s", station_names());
+        argp_error(state, "--station is needed: one of %s", sim_station_names());
     }
     const double most_A = sim_least_maximum_A(taper_stations[chosen->station]);
     if (chosen->min_current_A > most_A) {
@@ -171,12 +117,14 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     switch (key) {
     case KEY_SESSIONS: chosen->sessions_file = text; break;
     case KEY_POLICY: set_policy(chosen, text, state); break;
-    case KEY_STATION: set_station(chosen, text, state); break;
-    case KEY_LIMIT: chosen->limit_kw = not_negative("--limit-kw", text, state); break;
+    case KEY_STATION: chosen->station = sim_argument_station(text, state); break;
+    case KEY_LIMIT: chosen->limit_kw = sim_argument_number("--limit-kw", text, state); break;
     case KEY_LIMIT_CSV: chosen->limit_file = text; break;
-    case KEY_TICK: chosen->tick_s = (uint32_t)whole_number("--tick-s", text, 1, LONGEST_TICK_S, state); break;
-    case KEY_MINIMUM: chosen->min_current_A = not_negative("--min-current-a", text, state); break;
-    case KEY_SEED: chosen->seed = whole_number("--seed", text, 0, UINT64_MAX, state); break;
+    case KEY_TICK:
+        chosen->tick_s = (uint32_t)sim_argument_whole("--tick-s", text, 1, LONGEST_TICK_S, state);
+        break;
+    case KEY_MINIMUM: chosen->min_current_A = sim_argument_number("--min-current-a", text, state); break;
+    case KEY_SEED: chosen->seed = sim_argument_whole("--seed", text, 0, UINT64_MAX, state); break;
     case KEY_OUT: chosen->out = text; break;
     case KEY_PROBLEMS: chosen->problems_file = text; break;
     case ARGP_KEY_ARG: argp_error(state, "unexpected argument '%s'", text); break;
@@ -198,7 +146,7 @@ sim_options_t sim_options_parse(int argc, char **argv) {
     static const struct argp parser = {
         .options = options, .parser = parse, .doc = description, .help_filter = add_names};
     sim_options_t chosen = {
-        .station = find_station("garage"), .limit_kw = -1.0, .min_current_A = -1.0, .tick_s = 60};
+        .station = sim_station_find("garage"), .limit_kw = -1.0, .min_current_A = -1.0, .tick_s = 60};
     argp_err_exit_status = SIM_EXIT_USAGE;
     // Every error of ours ends the program inside; what is left is memory that argp could not get.
     if (argp_parse(&parser, argc, argv, 0, NULL, &chosen) != 0) {

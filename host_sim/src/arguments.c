@@ -1,0 +1,62 @@
+#define _POSIX_C_SOURCE 200809L // open_memstream
+
+#include "arguments.h"
+
+#include <argp.h>
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "csv_table.h"
+#include "taper/stations.h"
+
+unsigned sim_station_find(const char *name) {
+    unsigned i = 0;
+    while (i < taper_station_count && strcmp(taper_stations[i]->name, name) != 0) {
+        i++;
+    }
+    return i;
+}
+
+char *sim_station_names(void) {
+    char *names = NULL;
+    size_t size = 0;
+    FILE *stream = open_memstream(&names, &size);
+    for (unsigned i = 0; stream != NULL && i < taper_station_count; i++) {
+        fprintf(stream, "%s%s", i == 0 ? "" : ", ", taper_stations[i]->name);
+    }
+    return stream != NULL && fclose(stream) == 0 ? names : NULL;
+}
+
+unsigned sim_argument_station(const char *name, struct argp_state *state) {
+    const unsigned station = sim_station_find(name);
+    if (station == taper_station_count) {
+        argp_error(state, "--station: unknown station '%s'; there are %s", name, sim_station_names());
+    }
+    return station;
+}
+
+double sim_argument_number(const char *option, const char *text, struct argp_state *state) {
+    double value = 0.0;
+    if (!sim_parse_number(text, &value)) {
+        argp_error(state, "%s: not a number: '%s'", option, text);
+    }
+    if (value < 0.0) {
+        argp_error(state, "%s: below 0: %s", option, text);
+    }
+    return fabs(value); // no -0
+}
+
+uint64_t sim_argument_whole(const char *option, const char *text, uint64_t low, uint64_t high,
+                            struct argp_state *state) {
+    char *end = NULL;
+    errno = 0;
+    const uint64_t value = strtoull(text, &end, 10);
+    if (text[0] < '0' || text[0] > '9' || *end != '\0' || errno != 0 || value < low || value > high) {
+        argp_error(state, "%s: not a whole number in %llu..%llu: '%s'", option, (unsigned long long)low,
+                   (unsigned long long)high, text);
+    }
+    return value;
+}
