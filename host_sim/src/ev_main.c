@@ -1,3 +1,5 @@
+#define _POSIX_C_SOURCE 200809L
+
 /**
  * taper-ev: the field of a station - connector controllers, vehicles, energy gateway - on CAN interfaces of Linux.
  * `taper-ev --help` is the manual.

@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "arguments.h"
 #include "taper/station.h"
 #include "taper/stations.h"
 
@@ -78,7 +79,7 @@ _Static_assert(TAPER_MAX_TIME_SCALE == 1000, "the help says 1000");
 /** Add the names that this program knows to the help. */
 static char *add_names(int key, const char *text, void *input) {
     (void)input;
-    char *names = key == KEY_STATION ? sim_station_names() : NULL;
+    char *names = key == KEY_STATION ? taper_argument_station_names() : NULL;
     char *longer = NULL;
     if (names != NULL && asprintf(&longer, "%s: %s", text, names) < 0) {
         longer = NULL;
@@ -159,18 +160,18 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     switch (key) {
     case KEY_CAN: add_interface(chosen, text, state); break;
     case KEY_SESSIONS: chosen->sessions_file = text; break;
-    case KEY_STATION: chosen->station = sim_argument_station(text, state); break;
+    case KEY_STATION: chosen->station = taper_argument_station("--station", text, state); break;
     case KEY_SCALE:
         chosen->time_scale =
-            (uint32_t)sim_argument_whole("--time-scale", text, 1, TAPER_MAX_TIME_SCALE, state);
+            (uint32_t)taper_argument_whole("--time-scale", text, 1, TAPER_MAX_TIME_SCALE, state);
         break;
-    case KEY_LIMIT: chosen->limit_kw = sim_argument_number("--limit-kw", text, state); break;
+    case KEY_LIMIT: chosen->limit_kw = taper_argument_not_negative("--limit-kw", text, state); break;
     case KEY_LIMIT_CSV: chosen->limit_file = text; break;
     case KEY_CONNECTORS: set_connectors(chosen, text, state); break;
     case KEY_NO_GATEWAY: chosen->no_gateway = true; break;
     case KEY_NO_TAPER: chosen->no_taper = true; break;
     case KEY_OUT: chosen->out = text; break;
-    case KEY_SEED: chosen->seed = sim_argument_whole("--seed", text, 0, UINT64_MAX, state); break;
+    case KEY_SEED: chosen->seed = taper_argument_whole("--seed", text, 0, UINT64_MAX, state); break;
     case KEY_STAY: chosen->stay = true; break;
     case ARGP_KEY_ARG: argp_error(state, "unexpected argument '%s'", text); break;
     case ARGP_KEY_END: check(chosen, state); break;

@@ -5,7 +5,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "arguments.h"
+#include "exit_codes.h"
 #include "taper/socketcan.h"
 #include "taper/types.h"
 

@@ -29,10 +29,20 @@ bool sim_fleet_report(sim_fleet_t *fleet, unsigned connector) {
     return sent;
 }
 
+bool sim_fleet_echo(sim_fleet_t *fleet, unsigned connector) {
+    sim_evse_t *evse = &fleet->evse[connector];
+    const taper_message_t message = sim_evse_message(evse, SIM_EVSE_STATUS);
+    return sim_wire_send(fleet->port, &message, &evse->counter[SIM_EVSE_STATUS]);
+}
+
 void sim_fleet_listen(sim_fleet_t *fleet) {
     for (unsigned i = 0; i < fleet->station->connector_count; i++) {
         fleet->evse[i].in_force = false;
     }
+    sim_fleet_hear(fleet);
+}
+
+void sim_fleet_hear(sim_fleet_t *fleet) {
     taper_frame_t frame;
     while (fleet->port->receive(fleet->port->context, &frame)) {
         const int connector = sim_setpoint_connector(fleet->station, &frame);

@@ -31,8 +31,14 @@ void sim_fleet_init(sim_fleet_t *fleet, const taper_station_config_t *station, c
 /** A connector reports itself and its vehicle. @return false: the bus is full. */
 bool sim_fleet_report(sim_fleet_t *fleet, unsigned connector);
 
-/** Take what the station sent: every connector that hears a valid setpoint obeys it, the others fall back. */
+/** A connector reports itself alone, with the setpoint that it accepted last. @return false: the bus is full. */
+bool sim_fleet_echo(sim_fleet_t *fleet, unsigned connector);
+
+/** Take what the station sent in a tick: every connector that hears a valid setpoint obeys it, the others fall back. */
 void sim_fleet_listen(sim_fleet_t *fleet);
+
+/** Take what the station sent besides, in the same tick. */
+void sim_fleet_hear(sim_fleet_t *fleet);
 
 /** Set the power of a connector's vehicle for the tick that begins at `now_s`. */
 void sim_fleet_draw(sim_fleet_t *fleet, unsigned connector, double now_s);

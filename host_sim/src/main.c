@@ -12,7 +12,7 @@
 #include "output.h"
 #include "results.h"
 #include "sessions.h"
-#include "solver.h"
+#include "setup.h"
 #include "taper/stations.h"
 #include "world.h"
 
@@ -77,7 +77,7 @@ static bool close_problems(const sim_options_t *options, FILE *file) {
 }
 
 static void note_missing_planner(const sim_options_t *options) {
-    if (options->policy->propose == NULL && sim_solver(options->station) == NULL) {
+    if (options->policy->propose == NULL && taper_setup_solver(options->station) == NULL) {
         fprintf(stderr, "taper-sim: note: this build has no planner; %s charges by earliest deadline first\n",
                 options->policy->name);
     }
@@ -95,7 +95,7 @@ static int load_and_run(const sim_options_t *options, const taper_station_config
         (options->out == NULL || sim_output_check(options->out)) && open_problems(options, &problems)) {
         note_missing_planner(options);
         const sim_case_t run = {.station = station,
-                                .solver = sim_solver(options->station),
+                                .solver = taper_setup_solver(options->station),
                                 .policy = options->policy,
                                 .sessions = &sessions,
                                 .limits = &limits,
@@ -113,6 +113,10 @@ static int load_and_run(const sim_options_t *options, const taper_station_config
 
 int main(int argc, char **argv) {
     const sim_options_t options = sim_options_parse(argc, argv);
+    if (options.replay.file != NULL) {
+        const int result = sim_replay_run(&options.replay);
+        return fflush(stdout) == 0 ? result : SIM_EXIT_INPUT;
+    }
     station_copy_t station = copy_station(&options);
     const int code = load_and_run(&options, &station.config);
     free(station.connectors);

@@ -5,8 +5,9 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "arguments.h"
 #include "baselines.h"
+#include "exit_codes.h"
+#include "replay.h"
 #include "taper/types.h"
 
 /** Strings are borrowed from the command line. */
@@ -21,6 +22,10 @@ typedef struct {
     double min_current_A; /**< negative: the station's own */
     uint32_t tick_s;
     uint64_t seed;
+    sim_replay_options_t replay; /**< its file is NULL: no replay, a run */
+    bool station_given;
+    const char *run_option;    /**< an option given that only a run knows, or NULL */
+    const char *replay_option; /**< an option given that only a replay knows, or NULL */
 } sim_options_t;
 
 /** Read the command line. Prints and ends the program on --help (0) and on what it does not understand (2). */

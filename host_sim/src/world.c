@@ -10,13 +10,12 @@
 #include "problems.h"
 #include "progress.h"
 #include "queue.h"
+#include "setup.h"
 #include "taper/membus.h"
 #include "tracker.h"
 
-/** A tick of this length or more has room for a whole solve; shorter ones work in slices. */
-#define LONG_TICK_S      10
-#define SLICE_ITERATIONS 50
-#define SOLVE_ITERATIONS TAPER_MAX_ITERATIONS
+/** A decrease pays for an increase in the next round; more than a few are not needed. */
+#define HAND_OVER_ROUNDS 6
 
 typedef struct {
     const sim_case_t *run;
@@ -64,7 +63,7 @@ static bool init_station(world_t *world) {
         .port = &world->port,
         .solver = plans ? run->solver : NULL,
         .policy = plans ? NULL : &world->policy,
-        .iterations_per_tick = world->tick_s >= LONG_TICK_S ? SOLVE_ITERATIONS : SLICE_ITERATIONS,
+        .iterations_per_tick = taper_setup_iterations(run->station->tick_ms),
     };
     return taper_station_init(&world->station, &options) == TAPER_OK;
 }
@@ -126,7 +125,25 @@ static void note_solve(world_t *world) {
     }
 }
 
+/**
+ * What one connector gives up reaches another: setpoints out, echoes in, until nobody waits any more. On a real bus that
+ * takes less than a second; here no time passes.
+ */
+static bool hand_over(world_t *world, uint32_t now_ms) {
+    bool sent = true;
+    for (unsigned round = 0; round < HAND_OVER_ROUNDS && taper_station_hands_over(&world->station); round++) {
+        for (unsigned i = 0; i < world->run->station->connector_count; i++) {
+            sent = sim_fleet_echo(&world->fleet, i) && sent;
+        }
+        taper_station_poll(&world->station, now_ms);
+        sim_fleet_hear(&world->fleet);
+    }
+    return sent;
+}
+
 static bool run_tick(world_t *world, int64_t now_s) {
+    const uint32_t now_ms = (uint32_t)((uint64_t)now_s * 1000U);
+    taper_membus_set_time(&world->bus, now_ms);
     sim_queue_advance(&world->queue, now_s);
     if (!sim_gateway_publish(&world->gateway, &world->station, now_s) || !send_reports(world, now_s)) {
         fprintf(stderr,
@@ -134,9 +151,12 @@ static bool run_tick(world_t *world, int64_t now_s) {
                 (long long)now_s);
         return false;
     }
-    taper_station_step(&world->station, (uint32_t)((uint64_t)now_s * 1000U));
+    taper_station_step(&world->station, now_ms);
     note_solve(world);
     sim_fleet_listen(&world->fleet);
+    if (!hand_over(world, now_ms)) {
+        return false;
+    }
     draw_power(world, now_s);
     return true;
 }

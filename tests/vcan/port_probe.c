@@ -3,6 +3,8 @@
  *
  * port_probe INTERFACE[,INTERFACE...] [ID:MASK...]   (filters, in hex)
  *
+ * With REFUSE_OPTIONS in the environment, the kernel seems to refuse all options of sockets, as qemu-user does.
+ *
  *   send BUS ID DATA     "sent" or "refused" (hex; no data: -)
  *   flood BUS COUNT      frames 123 with a running number; "sent N"
  *   wait BUS MS          "readable" once the bus has something to read; "silent" if it has not for so long
@@ -14,10 +16,12 @@
  *   overflows BUS        a number, that of all buses
  *   shift SECONDS        "shifted": the system's clock is set, for this program only
  */
+#include <errno.h>
 #include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/socket.h>
 #include <time.h>
 
 #include "taper/socketcan.h"
@@ -30,7 +34,19 @@ static time_t shift_s;
 int __real_clock_gettime(clockid_t clock, struct timespec *now);
 int __wrap_clock_gettime(clockid_t clock, struct timespec *now);
 
-/* The linker puts this in the place of clock_gettime(). */
+int __real_setsockopt(int fd, int level, int name, const void *value, socklen_t size);
+int __wrap_setsockopt(int fd, int level, int name, const void *value, socklen_t size);
+
+/* The linker puts these in the place of clock_gettime() and setsockopt(). */
+
+int __wrap_setsockopt(int fd, int level, int name, const void *value, socklen_t size) {
+    if (getenv("REFUSE_OPTIONS") != NULL) {
+        errno = ENOPROTOOPT;
+        return -1;
+    }
+    return __real_setsockopt(fd, level, name, value, size);
+}
+
 int __wrap_clock_gettime(clockid_t clock, struct timespec *now) {
     const int result = __real_clock_gettime(clock, now);
     now->tv_sec += clock == CLOCK_REALTIME ? shift_s : 0;
