@@ -82,6 +82,7 @@ typedef struct {
 /** One CAN bus of the station, as a sender sees it. */
 typedef struct {
     bool silent;              /**< nothing is sent until `retry_ms` */
+    bool in_trouble;          /**< nothing was taken since it was first left alone */
     bool refusing;            /**< since `refusing_since_ms` nothing was taken */
     uint32_t refusing_since_ms;
     uint32_t retry_ms;
