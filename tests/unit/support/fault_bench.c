@@ -91,7 +91,7 @@ void fault_inject(const taper_membus_faults_t *faults) {
 
 void fault_say_frame(const taper_frame_t *frame) {
     taper_membus_set_time(&live.bus, live.now_ms);
-    TEST_ASSERT_TRUE(taper_membus_world_send(&live.bus, frame));
+    (void)taper_membus_world_send(&live.bus, frame); /* a full queue has lost an older one */
 }
 
 void fault_say(const taper_message_t *message) {
