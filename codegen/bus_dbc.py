@@ -1,4 +1,4 @@
-"""The station bus as CAN databases: a compact one for the C codec, and one with every connector for people and tools."""
+"""The station bus as CAN databases: a compact one for the C codec, one with every connector for people and tools."""
 
 from collections.abc import Iterator
 from decimal import Decimal

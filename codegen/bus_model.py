@@ -238,7 +238,8 @@ def _check_layout(table: Table, message: Message) -> None:
     owner: dict[int, str] = dict.fromkeys(range(first), "CRC and counter")
     for signal in message.signals:
         if signal.start + signal.length > FRAME_BITS:
-            raise table.error(signal.name, f"ends at bit {signal.start + signal.length - 1}, beyond bit {FRAME_BITS - 1}")
+            last = signal.start + signal.length - 1
+            raise table.error(signal.name, f"ends at bit {last}, beyond bit {FRAME_BITS - 1}")
         for bit in range(signal.start, signal.start + signal.length):
             if bit in owner:
                 raise table.error(signal.name, f"bit {bit} is already of {owner[bit]}")
@@ -314,7 +315,7 @@ def _absent(table: Table, length: int, signed: bool) -> int | None:
 def _range(
     table: Table, length: int, signed: bool, step: int, absent: int | None, named: Values | None
 ) -> tuple[int, int]:
-    """Least and greatest raw value: as the file says, else all that the bits hold, but for an absent code at the end."""
+    """Least and greatest raw value: as the file says, else what the bits hold, but for an absent code at the end."""
     least, most = _raw_ends(length, signed)
     low = least + 1 if absent == least else least
     high = most - 1 if absent == most else most
@@ -337,7 +338,8 @@ def _raw(table: Table, key: str, step: int, least: int, most: int, default: int)
         raise table.error(key, f"is not a multiple of the step {step / MILLI:g}")
     raw = thousandths // step
     if not least <= raw <= most:
-        raise table.error(key, f"cannot be represented: the bits hold {least * step / MILLI:g} to {most * step / MILLI:g}")
+        ends = f"{least * step / MILLI:g} to {most * step / MILLI:g}"
+        raise table.error(key, f"cannot be represented: the bits hold {ends}")
     return raw
 
 
@@ -349,7 +351,8 @@ def _check_number(table: Table, signal: Signal) -> None:
         raise table.error("c_unit", "the step is not a whole number of it")
     is_short = (signal.low, signal.high) != _raw_ends(signal.length, signal.signed) and signal.values is None
     if (signal.step != MILLI or is_short) != bool(signal.rounding):
-        raise table.error("round", "missing" if not signal.rounding else "is for what has a step, a range or an absent code")
+        reason = "is for what has a step, a range or an absent code" if signal.rounding else "missing"
+        raise table.error("round", reason)
     if signal.rounding and signal.rounding not in ROUNDINGS:
         raise table.error("round", f"must be one of {', '.join(ROUNDINGS)}")
     if signal.rounding and (signal.length > 16 or max(-signal.low, signal.high) * signal.c_step > _INT32_MAX):
@@ -376,8 +379,8 @@ def _check_as_a_whole(root: Table, bus: Bus) -> None:
         used = [f"{m.name}.{s.name}" for m in bus.messages for s in m.signals if s.values is values]
         if not used:
             raise root.error(values.name, "no signal has these values")
-        c_names = [f"{values.prefix}_{code.name}".upper() for code in values.codes] + [values.count] * bool(values.count)
-        for c_name in c_names if values.c_type else []:
+        c_names = [f"{values.prefix}_{code.name}".upper() for code in values.codes] if values.c_type else []
+        for c_name in [*c_names, values.count] if values.count else c_names:
             if c_name in names:
                 raise root.error(values.name, f"TAPER_{c_name} is already in {names[c_name]}")
             names[c_name] = values.name

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from toml_table import Table, load
 
-# Bounds of the firmware's types (taper/types.h) and of the fields on the bus (taper.dbc).
+# Bounds of the firmware's types (taper/types.h) and of the fields on the bus (bus.toml).
 MAX_CONNECTORS = 240  # four buses of 60; a connector index is one byte
 MAX_GROUPS = 254  # a group index is one byte; 255 says "no parent"
 MAX_STEPS = 255  # one byte

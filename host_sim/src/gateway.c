@@ -1,6 +1,7 @@
 #include "gateway.h"
 
 #include <math.h>
+#include <stddef.h>
 
 #include "taper/codec.h"
 #include "wire.h"
@@ -13,9 +14,9 @@
 #define MOST_W              2e9
 #define LONGEST_VALIDITY_S  254
 
-void sim_gateway_init(sim_gateway_t *gateway, const sim_limits_t *limits, taper_membus_t *bus, int64_t tick_s,
-                      uint64_t seed) {
-    *gateway = (sim_gateway_t){.limits = limits, .bus = bus, .tick_s = tick_s, .next_curve_s = INT64_MIN};
+void sim_gateway_init(sim_gateway_t *gateway, const sim_limits_t *limits, const taper_port_t *port,
+                      int64_t tick_s, uint64_t seed) {
+    *gateway = (sim_gateway_t){.limits = limits, .port = port, .tick_s = tick_s, .next_curve_s = INT64_MIN};
     gateway->counter[0] = (uint8_t)((seed >> 4) % 16);
     gateway->counter[1] = (uint8_t)((seed >> 8) % 16);
 }
@@ -24,25 +25,41 @@ double sim_gateway_limit_kw(const sim_gateway_t *gateway, int64_t now_s) {
     return sim_limits_least_kw(gateway->limits, (double)now_s, (double)(now_s + gateway->tick_s));
 }
 
+double sim_gateway_limit_at_kw(const sim_gateway_t *gateway, double time_s) {
+    const sim_limits_t *limits = gateway->limits;
+    return limits == NULL ? (double)INFINITY : limits->limit_kw[sim_limits_point(limits, time_s)];
+}
+
 /** Whole watts, down; the hair is what a decimal fraction of a kilowatt lacks in binary. */
 static int32_t watts(double kw) {
     return (int32_t)fmin(floor(kw * 1000.0 + 1e-6), MOST_W);
 }
 
+bool sim_gateway_send_time(sim_gateway_t *gateway, double unix_s) {
+    const double whole_s = floor(unix_s);
+    const taper_message_t message = {.kind = TAPER_MESSAGE_TIME_SYNC,
+                                     .node = TAPER_NODE_GATEWAY,
+                                     .as.time_sync = {.unix_s = (uint32_t)whole_s,
+                                                      .ms = (uint16_t)((unix_s - whole_s) * 1000.0),
+                                                      .quality = 1}};
+    return sim_wire_send(gateway->port, &message, &gateway->counter[0]);
+}
+
+bool sim_gateway_send_limit(sim_gateway_t *gateway, double limit_kw, int32_t validity_s) {
+    const bool active = isfinite(limit_kw);
+    const taper_message_t message = {.kind = TAPER_MESSAGE_SITE_LIMIT,
+                                     .node = TAPER_NODE_GATEWAY,
+                                     .as.site_limit = {.active = active,
+                                                       .limit_W = active ? watts(limit_kw) : TAPER_ABSENT,
+                                                       .failsafe_W = TAPER_ABSENT,
+                                                       .validity_s = validity_s}};
+    return sim_wire_send(gateway->port, &message, &gateway->counter[1]);
+}
+
 bool sim_gateway_report(sim_gateway_t *gateway, int64_t now_s) {
-    const taper_message_t time_sync = {.kind = TAPER_MESSAGE_TIME_SYNC,
-                                       .node = TAPER_NODE_GATEWAY,
-                                       .as.time_sync = {.unix_s = (uint32_t)now_s, .quality = 1}};
     const int32_t validity_s = taper_clamp_i32((int32_t)gateway->tick_s * 2, 5, LONGEST_VALIDITY_S);
-    const taper_message_t site_limit = {
-        .kind = TAPER_MESSAGE_SITE_LIMIT,
-        .node = TAPER_NODE_GATEWAY,
-        .as.site_limit = {.active = true,
-                          .limit_W = watts(sim_gateway_limit_kw(gateway, now_s)),
-                          .failsafe_W = TAPER_ABSENT,
-                          .validity_s = validity_s}};
-    const bool clock_sent = sim_wire_send(gateway->bus, &time_sync, &gateway->counter[0]);
-    return sim_wire_send(gateway->bus, &site_limit, &gateway->counter[1]) && clock_sent;
+    const bool clock_sent = sim_gateway_send_time(gateway, (double)now_s);
+    return sim_gateway_send_limit(gateway, sim_gateway_limit_kw(gateway, now_s), validity_s) && clock_sent;
 }
 
 static uint32_t station_ms(double time_s) {

@@ -12,7 +12,7 @@
 #include "output.h"
 #include "results.h"
 #include "sessions.h"
-#include "solver.h"
+#include "setup.h"
 #include "taper/stations.h"
 #include "world.h"
 
@@ -35,22 +35,6 @@ static station_copy_t copy_station(const sim_options_t *options) {
     copy.config.connectors = copy.connectors;
     copy.config.tick_ms = options->tick_s * 1000U;
     return copy;
-}
-
-/** The site limit of the run: what was asked for, nowhere above the station's own. */
-static bool load_limits(sim_limits_t *limits, const sim_options_t *options, double station_kw) {
-    if (options->limit_file != NULL) {
-        if (!sim_limits_load(limits, options->limit_file)) {
-            return false;
-        }
-    } else {
-        sim_limits_constant(limits, options->limit_kw >= 0.0 ? options->limit_kw : station_kw);
-    }
-    if (sim_limits_cap(limits, station_kw)) {
-        fprintf(stderr, "taper-sim: note: the limit is above the station's own, %g kW, which holds\n",
-                station_kw);
-    }
-    return true;
 }
 
 /** Run and put the results out. @return the exit code of the program. */
@@ -93,7 +77,7 @@ static bool close_problems(const sim_options_t *options, FILE *file) {
 }
 
 static void note_missing_planner(const sim_options_t *options) {
-    if (options->policy->propose == NULL && sim_solver(options->station) == NULL) {
+    if (options->policy->propose == NULL && taper_setup_solver(options->station) == NULL) {
         fprintf(stderr, "taper-sim: note: this build has no planner; %s charges by earliest deadline first\n",
                 options->policy->name);
     }
@@ -106,11 +90,12 @@ static int load_and_run(const sim_options_t *options, const taper_station_config
     FILE *problems = NULL;
     int code = SIM_EXIT_INPUT;
     if (sim_sessions_load(&sessions, options->sessions_file, station->connector_count) &&
-        load_limits(&limits, options, station->groups[0].limit_W / 1000.0) &&
+        sim_limits_choose(&limits, options->limit_file, options->limit_kw,
+                          station->groups[0].limit_W / 1000.0) &&
         (options->out == NULL || sim_output_check(options->out)) && open_problems(options, &problems)) {
         note_missing_planner(options);
         const sim_case_t run = {.station = station,
-                                .solver = sim_solver(options->station),
+                                .solver = taper_setup_solver(options->station),
                                 .policy = options->policy,
                                 .sessions = &sessions,
                                 .limits = &limits,
@@ -128,6 +113,10 @@ static int load_and_run(const sim_options_t *options, const taper_station_config
 
 int main(int argc, char **argv) {
     const sim_options_t options = sim_options_parse(argc, argv);
+    if (options.replay.file != NULL) {
+        const int result = sim_replay_run(&options.replay);
+        return fflush(stdout) == 0 ? result : SIM_EXIT_INPUT;
+    }
     station_copy_t station = copy_station(&options);
     const int code = load_and_run(&options, &station.config);
     free(station.connectors);

@@ -3,19 +3,20 @@
 #include "options.h"
 
 #include <argp.h>
-#include <errno.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "csv_table.h"
+#include "arguments.h"
 #include "taper/stations.h"
 
-#define LONGEST_TICK_S 3600
+#define LONGEST_TICK_S  3600
+#define DEFAULT_STATION "garage"
 
 static const char description[] =
-    "Replay charging sessions through the Taper firmware and a simulated fleet, in virtual time."
+    "Replay charging sessions through the Taper firmware and a simulated fleet, in virtual time; or replay "
+    "the "
+    "recorded bus of a real station through it (--replay-log)."
     "\v"
     "SESSIONS CSV: a header, then one row per session, columns in any order: session_id, connector (1.., "
     "empty: the first free one), arrival_s, departure_s [s], battery_kwh [kWh], soc_arrival, soc_target "
@@ -29,7 +30,17 @@ static const char description[] =
     "except for solve_ms in summary.json, which is wall time. A session that is plugged in at the first tick "
     "after its arrival has queued for 0 s.\n"
     "\n"
-    "EXIT CODE: 0 good, 1 bad input, 2 bad command line, 3 a limit was exceeded.\n";
+    "RECORDED BUS: --replay-log feeds what taper-station --record wrote to a fresh station with the same "
+    "options, "
+    "and compares all that it sends with the recording, bit by bit. A log of candump -l does too, if it "
+    "begins "
+    "before the station; who sent a frame is then told by its identifier, and its times tell those of the "
+    "station's calls to about a millisecond: a frame that came within that of a call can make a difference "
+    "that "
+    "was none. Both need the station's life from its start, without a store and without bus-off.\n"
+    "\n"
+    "EXIT CODE: 0 good, 1 bad input, 2 bad command line, 3 a limit was exceeded, 4 a replay differs from its "
+    "recording.\n";
 
 enum {
     KEY_SESSIONS = 256,
@@ -42,6 +53,15 @@ enum {
     KEY_SEED,
     KEY_OUT,
     KEY_PROBLEMS,
+    KEY_FIRST_OF_REPLAY,
+    KEY_REPLAY_LOG = KEY_FIRST_OF_REPLAY,
+    KEY_CAN,
+    KEY_FAILSAFE,
+    KEY_TICK_MS,
+    KEY_TIME_SCALE,
+    KEY_ITERATIONS,
+    KEY_NO_PLANNER,
+    KEY_LAST_OF_REPLAY = KEY_NO_PLANNER,
 };
 
 static const struct argp_option options[] = {
@@ -58,29 +78,19 @@ static const struct argp_option options[] = {
      "Write every planning problem to this file (input of planner_probe)", 0},
     {"out", KEY_OUT, "DIR", 0,
      "Write the results to this directory, made if missing (default: only print a summary)", 0},
+    {NULL, 0, NULL, 0, "Replay of a recorded bus, with --station, --limit-kw and:", 1},
+    {"replay-log", KEY_REPLAY_LOG, "FILE", 0, "Recording of taper-station or of candump -l (see below)", 1},
+    {"can", KEY_CAN, "IFACE", 0,
+     "Interface in the recording; once for each bus, bus 0 first (default: in order of appearance)", 1},
+    {"failsafe-kw", KEY_FAILSAFE, "X", 0, "As taper-station was told", 1},
+    {"tick-ms", KEY_TICK_MS, "N", 0, "As taper-station was told", 1},
+    {"time-scale", KEY_TIME_SCALE, "S", 0, "As taper-station was told", 1},
+    {"iterations", KEY_ITERATIONS, "N", 0, "As taper-station was told", 1},
+    {"no-planner", KEY_NO_PLANNER, NULL, 0, "As taper-station was told", 1},
     {0},
 };
 
-/** @return the index of a station, or taper_station_count. */
-static unsigned find_station(const char *name) {
-    unsigned i = 0;
-    while (i < taper_station_count && strcmp(taper_stations[i]->name, name) != 0) {
-        i++;
-    }
-    return i;
-}
-
 /** The names, separated by commas; for help and errors. To be freed. */
-static char *station_names(void) {
-    char *names = NULL;
-    size_t size = 0;
-    FILE *stream = open_memstream(&names, &size);
-    for (unsigned i = 0; stream != NULL && i < taper_station_count; i++) {
-        fprintf(stream, "%s%s", i == 0 ? "" : ", ", taper_stations[i]->name);
-    }
-    return stream != NULL && fclose(stream) == 0 ? names : NULL;
-}
-
 static char *policy_names(bool with_help) {
     char *names = NULL;
     size_t size = 0;
@@ -97,7 +107,9 @@ static char *policy_names(bool with_help) {
 /** Add the names that this program knows to the help. */
 static char *add_names(int key, const char *text, void *input) {
     (void)input;
-    char *names = key == KEY_POLICY ? policy_names(true) : key == KEY_STATION ? station_names() : NULL;
+    char *names = key == KEY_POLICY    ? policy_names(true)
+                  : key == KEY_STATION ? taper_argument_station_names()
+                                       : NULL;
     char *longer = NULL;
     if (names != NULL && asprintf(&longer, "%s: %s", text, names) < 0) {
         longer = NULL;
@@ -113,39 +125,53 @@ static void set_policy(sim_options_t *chosen, const char *name, struct argp_stat
     }
 }
 
-static void set_station(sim_options_t *chosen, const char *name, struct argp_state *state) {
-    chosen->station = find_station(name);
-    if (chosen->station == taper_station_count) {
-        argp_error(state, "--station: unknown station '%s'; there are %s", name, station_names());
+/** The name of an option. */
+static const char *name_of(int key) {
+    const struct argp_option *option = options;
+    while (option->name == NULL || option->key != key) {
+        option++;
     }
+    return option->name;
 }
 
-/** A number that is not negative. */
-static double not_negative(const char *option, const char *text, struct argp_state *state) {
-    double value = 0.0;
-    if (!sim_parse_number(text, &value)) {
-        argp_error(state, "%s: not a number: '%s'", option, text);
-    }
-    if (value < 0.0) {
-        argp_error(state, "%s: below 0: %s", option, text);
-    }
-    return fabs(value); // no -0
+/** Both kinds of run know --station and --limit-kw. */
+static bool is_of_both(int key) {
+    return key == KEY_STATION || key == KEY_LIMIT;
 }
 
-static uint64_t whole_number(const char *option, const char *text, uint64_t low, uint64_t high,
-                             struct argp_state *state) {
-    char *end = NULL;
-    errno = 0;
-    const uint64_t value = strtoull(text, &end, 10);
-    if (text[0] < '0' || text[0] > '9' || *end != '\0' || errno != 0 || value < low || value > high) {
-        argp_error(state, "%s: not a whole number in %llu..%llu: '%s'", option, (unsigned long long)low,
-                   (unsigned long long)high, text);
+static bool is_of_replay(int key) {
+    return key >= KEY_FIRST_OF_REPLAY && key <= KEY_LAST_OF_REPLAY;
+}
+
+/** Remember one option of either kind, to refuse what makes no sense together. */
+static void note_option(sim_options_t *chosen, int key) {
+    if (is_of_replay(key)) {
+        chosen->replay_option = key == KEY_REPLAY_LOG ? chosen->replay_option : name_of(key);
+    } else if (key >= KEY_SESSIONS && key < KEY_FIRST_OF_REPLAY && !is_of_both(key)) {
+        chosen->run_option = name_of(key);
     }
-    return value;
+    chosen->station_given = chosen->station_given || key == KEY_STATION;
+}
+
+static void check_replay(const sim_options_t *chosen, struct argp_state *state) {
+    char reason[160];
+    static taper_made_t made;
+    if (chosen->run_option != NULL) {
+        argp_error(state, "--%s and --replay-log exclude each other", chosen->run_option);
+    }
+    if (!chosen->station_given) {
+        argp_error(state, "--replay-log needs --station");
+    }
+    if (!taper_setup_make(&chosen->replay.setup, &made, reason, sizeof reason)) {
+        argp_error(state, "%s", reason);
+    }
 }
 
 /** What can only be checked when all options are known. */
-static void check(const sim_options_t *chosen, struct argp_state *state) {
+static void check_run(const sim_options_t *chosen, struct argp_state *state) {
+    if (chosen->replay_option != NULL) {
+        argp_error(state, "--%s needs --replay-log", chosen->replay_option);
+    }
     if (chosen->sessions_file == NULL) {
         argp_error(state, "--sessions is needed");
     }
@@ -157,7 +183,7 @@ static void check(const sim_options_t *chosen, struct argp_state *state) {
         argp_error(state, "--limit-kw and --limit-csv exclude each other");
     }
     if (chosen->station == taper_station_count) {
-        argp_error(state, "--station is needed: one of %s", station_names());
+        argp_error(state, "--station is needed: one of %s", taper_argument_station_names());
     }
     const double most_A = sim_least_maximum_A(taper_stations[chosen->station]);
     if (chosen->min_current_A > most_A) {
@@ -166,22 +192,72 @@ static void check(const sim_options_t *chosen, struct argp_state *state) {
     }
 }
 
+static void check(sim_options_t *chosen, struct argp_state *state) {
+    if (chosen->replay.file == NULL) {
+        check_run(chosen, state);
+        return;
+    }
+    chosen->replay.setup.station = chosen->station;
+    chosen->replay.setup.limit_kw = chosen->limit_kw;
+    check_replay(chosen, state);
+}
+
+static void add_interface(sim_replay_options_t *replay, const char *name, struct argp_state *state) {
+    if (replay->name_count == sizeof replay->names / sizeof replay->names[0]) {
+        argp_error(state, "--can: more than %u buses", replay->name_count);
+        return;
+    }
+    replay->names[replay->name_count++] = name;
+}
+
+static uint16_t whole(const char *option, const char *text, uint16_t low, uint16_t high,
+                      struct argp_state *state) {
+    return (uint16_t)taper_argument_whole(option, text, low, high, state);
+}
+
+/** The options of --replay-log. @return whether `key` is one. */
+static bool parse_replay(int key, const char *text, sim_replay_options_t *replay, struct argp_state *state) {
+    taper_setup_t *setup = &replay->setup;
+    switch (key) {
+    case KEY_REPLAY_LOG: replay->file = text; break;
+    case KEY_CAN: add_interface(replay, text, state); break;
+    case KEY_FAILSAFE: setup->failsafe_kw = taper_argument_not_negative("--failsafe-kw", text, state); break;
+    case KEY_TICK_MS:
+        setup->tick_ms = whole("--tick-ms", text, TAPER_SETUP_TICK_MIN_ms, TAPER_SETUP_TICK_MAX_ms, state);
+        break;
+    case KEY_TIME_SCALE:
+        setup->time_scale = whole("--time-scale", text, 1, TAPER_MAX_TIME_SCALE, state);
+        break;
+    case KEY_ITERATIONS:
+        setup->iterations = whole("--iterations", text, TAPER_MIN_SLICE, TAPER_MAX_ITERATIONS, state);
+        break;
+    case KEY_NO_PLANNER: setup->no_planner = true; break;
+    default: return false;
+    }
+    return true;
+}
+
 static error_t parse(int key, char *text, struct argp_state *state) {
     sim_options_t *chosen = state->input;
+    note_option(chosen, key);
     switch (key) {
     case KEY_SESSIONS: chosen->sessions_file = text; break;
     case KEY_POLICY: set_policy(chosen, text, state); break;
-    case KEY_STATION: set_station(chosen, text, state); break;
-    case KEY_LIMIT: chosen->limit_kw = not_negative("--limit-kw", text, state); break;
+    case KEY_STATION: chosen->station = taper_argument_station("--station", text, state); break;
+    case KEY_LIMIT: chosen->limit_kw = taper_argument_not_negative("--limit-kw", text, state); break;
     case KEY_LIMIT_CSV: chosen->limit_file = text; break;
-    case KEY_TICK: chosen->tick_s = (uint32_t)whole_number("--tick-s", text, 1, LONGEST_TICK_S, state); break;
-    case KEY_MINIMUM: chosen->min_current_A = not_negative("--min-current-a", text, state); break;
-    case KEY_SEED: chosen->seed = whole_number("--seed", text, 0, UINT64_MAX, state); break;
+    case KEY_TICK:
+        chosen->tick_s = (uint32_t)taper_argument_whole("--tick-s", text, 1, LONGEST_TICK_S, state);
+        break;
+    case KEY_MINIMUM:
+        chosen->min_current_A = taper_argument_not_negative("--min-current-a", text, state);
+        break;
+    case KEY_SEED: chosen->seed = taper_argument_whole("--seed", text, 0, UINT64_MAX, state); break;
     case KEY_OUT: chosen->out = text; break;
     case KEY_PROBLEMS: chosen->problems_file = text; break;
     case ARGP_KEY_ARG: argp_error(state, "unexpected argument '%s'", text); break;
     case ARGP_KEY_END: check(chosen, state); break;
-    default: return ARGP_ERR_UNKNOWN;
+    default: return parse_replay(key, text, &chosen->replay, state) ? 0 : ARGP_ERR_UNKNOWN;
     }
     return 0;
 }
@@ -198,7 +274,11 @@ sim_options_t sim_options_parse(int argc, char **argv) {
     static const struct argp parser = {
         .options = options, .parser = parse, .doc = description, .help_filter = add_names};
     sim_options_t chosen = {
-        .station = find_station("garage"), .limit_kw = -1.0, .min_current_A = -1.0, .tick_s = 60};
+        .limit_kw = -1.0, .min_current_A = -1.0, .tick_s = 60, .replay.setup = taper_setup_default(0)};
+    while (chosen.station < taper_station_count &&
+           strcmp(taper_stations[chosen.station]->name, DEFAULT_STATION) != 0) {
+        chosen.station++;
+    }
     argp_err_exit_status = SIM_EXIT_USAGE;
     // Every error of ours ends the program inside; what is left is memory that argp could not get.
     if (argp_parse(&parser, argc, argv, 0, NULL, &chosen) != 0) {

@@ -6,15 +6,9 @@
 #include <stdint.h>
 
 #include "baselines.h"
+#include "exit_codes.h"
+#include "replay.h"
 #include "taper/types.h"
-
-/** Exit codes of the program. */
-enum {
-    SIM_EXIT_OK = 0,
-    SIM_EXIT_INPUT = 1,     /**< a file that cannot be read or written, or says something wrong */
-    SIM_EXIT_USAGE = 2,     /**< a command line that makes no sense */
-    SIM_EXIT_VIOLATION = 3, /**< the run went through, but a limit was exceeded */
-};
 
 /** Strings are borrowed from the command line. */
 typedef struct {
@@ -28,6 +22,10 @@ typedef struct {
     double min_current_A; /**< negative: the station's own */
     uint32_t tick_s;
     uint64_t seed;
+    sim_replay_options_t replay; /**< its file is NULL: no replay, a run */
+    bool station_given;
+    const char *run_option;    /**< an option given that only a run knows, or NULL */
+    const char *replay_option; /**< an option given that only a replay knows, or NULL */
 } sim_options_t;
 
 /** Read the command line. Prints and ends the program on --help (0) and on what it does not understand (2). */

@@ -1,7 +1,6 @@
 #include "queue.h"
 
 #include <math.h>
-#include <stdbool.h>
 #include <stdlib.h>
 
 #include "memory.h"
@@ -34,13 +33,16 @@ static size_t *order_by_arrival(const sim_sessions_t *sessions) {
     return order;
 }
 
-void sim_queue_init(sim_queue_t *queue, const sim_sessions_t *sessions, sim_fleet_t *fleet,
+void sim_queue_init(sim_queue_t *queue, const sim_sessions_t *sessions, sim_evse_t *evse, unsigned connectors,
                     sim_outcome_t *outcome) {
     *queue = (sim_queue_t){.sessions = sessions,
-                           .fleet = fleet,
+                           .evse = evse,
+                           .connectors = connectors,
                            .outcome = outcome,
-                           .order = order_by_arrival(sessions),
-                           .free = fleet->station->connector_count};
+                           .order = order_by_arrival(sessions)};
+    for (unsigned i = 0; i < connectors; i++) {
+        queue->free += evse[i].closed ? 0 : 1;
+    }
 }
 
 void sim_queue_free(sim_queue_t *queue) {
@@ -51,11 +53,11 @@ void sim_queue_free(sim_queue_t *queue) {
 
 /** Vehicles whose time has come leave their connectors; what they got is written down. */
 static void unplug_departed(sim_queue_t *queue, double now_s) {
-    for (unsigned i = 0; i < queue->fleet->station->connector_count; i++) {
-        const sim_evse_t *evse = &queue->fleet->evse[i];
+    for (unsigned i = 0; i < queue->connectors; i++) {
+        sim_evse_t *evse = &queue->evse[i];
         if (evse->vehicle != NULL && evse->vehicle->departure_s <= now_s) {
             queue->outcome[queue->at[i]].energy_kwh = evse->energy_kwh;
-            sim_fleet_unplug(queue->fleet, i);
+            sim_evse_unplug(evse);
             queue->free++;
         }
     }
@@ -75,6 +77,10 @@ static void admit(sim_queue_t *queue, int64_t now_s) {
     }
 }
 
+static bool is_free(const sim_evse_t *evse) {
+    return evse->vehicle == NULL && !evse->closed;
+}
+
 /** A free connector for a session, or -1. */
 static int find_connector(const sim_queue_t *queue, const sim_session_t *session) {
     if (queue->free == 0) {
@@ -82,10 +88,10 @@ static int find_connector(const sim_queue_t *queue, const sim_session_t *session
     }
     if (session->connector != 0) {
         const unsigned own = session->connector - 1;
-        return queue->fleet->evse[own].vehicle == NULL ? (int)own : -1;
+        return is_free(&queue->evse[own]) ? (int)own : -1;
     }
     unsigned lowest = 0;
-    while (queue->fleet->evse[lowest].vehicle != NULL) {
+    while (!is_free(&queue->evse[lowest])) {
         lowest++;
     }
     return (int)lowest;
@@ -103,7 +109,7 @@ static bool serve(sim_queue_t *queue, const sim_waiting_t *waiting, int64_t now_
     if (connector < 0) {
         return false;
     }
-    sim_fleet_plug(queue->fleet, (unsigned)connector, session);
+    sim_evse_plug(&queue->evse[connector], session);
     queue->at[connector] = waiting->session;
     queue->free--;
     outcome->connector = (unsigned)connector + 1;
@@ -122,6 +128,14 @@ void sim_queue_advance(sim_queue_t *queue, int64_t now_s) {
         }
     }
     queue->waiting_count = kept;
+}
+
+bool sim_queue_is_over(const sim_queue_t *queue) {
+    bool over = queue->next == queue->sessions->count && queue->waiting_count == 0;
+    for (unsigned i = 0; i < queue->connectors; i++) {
+        over = over && queue->evse[i].vehicle == NULL;
+    }
+    return over;
 }
 
 void sim_queue_finish(sim_queue_t *queue) {

@@ -12,9 +12,10 @@
 #include <stdint.h>
 #include <stdio.h>
 
-#include "fleet.h"
+#include "evse.h"
 #include "sessions.h"
 #include "stats.h"
+#include "taper/bus.h"
 
 /** What became of one session. */
 typedef struct {

@@ -5,10 +5,13 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "taper/membus.h"
 #include "taper/message.h"
+#include "taper/port.h"
 
-/** Encode a message, protect it with `*counter`, which moves on by one (0..15), and send it. @return false: bus full. */
-bool sim_wire_send(taper_membus_t *bus, const taper_message_t *message, uint8_t *counter);
+/**
+ * Encode a message, protect it with `*counter` and send it. `*counter` (0..15) moves on by one if the bus took it: a
+ * frame that was never sent leaves no gap. @return false: the bus is full.
+ */
+bool sim_wire_send(const taper_port_t *port, const taper_message_t *message, uint8_t *counter);
 
 #endif

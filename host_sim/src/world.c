@@ -10,21 +10,21 @@
 #include "problems.h"
 #include "progress.h"
 #include "queue.h"
+#include "setup.h"
+#include "taper/membus.h"
+#include "tracker.h"
 
-/** Power above a limit by less than this is rounding of doubles [kW]. */
-#define LIMIT_TOLERANCE_KW 1e-6
-/** A tick of this length or more has room for a whole solve; shorter ones work in slices. */
-#define LONG_TICK_S      10
-#define SLICE_ITERATIONS 50
-#define SOLVE_ITERATIONS TAPER_MAX_ITERATIONS
+/** A decrease pays for an increase in the next round; more than a few are not needed. */
+#define HAND_OVER_ROUNDS 6
 
 typedef struct {
     const sim_case_t *run;
     sim_results_t *results;
     int64_t tick_s;
     taper_membus_t bus;
-    taper_port_t port;
-    uint32_t tick_ms; /**< context of the policy */
+    taper_port_t port;       /**< the station's end of the bus */
+    taper_port_t world_port; /**< the other end */
+    uint32_t tick_ms;        /**< context of the policy */
     taper_policy_t policy;
     taper_station_t station;
     sim_fleet_t fleet;
@@ -63,7 +63,7 @@ static bool init_station(world_t *world) {
         .port = &world->port,
         .solver = plans ? run->solver : NULL,
         .policy = plans ? NULL : &world->policy,
-        .iterations_per_tick = world->tick_s >= LONG_TICK_S ? SOLVE_ITERATIONS : SLICE_ITERATIONS,
+        .iterations_per_tick = taper_setup_iterations(run->station->tick_ms),
     };
     return taper_station_init(&world->station, &options) == TAPER_OK;
 }
@@ -81,47 +81,29 @@ static bool send_reports(world_t *world, int64_t now_s) {
                                            : sim_fleet_report(&world->fleet, node);
         sent = sent && ok;
     }
-    return sent;
-}
-
-/** Whether some limit is exceeded: that of the site in this tick, or that of a group of the feeder tree. */
-static bool is_violated(world_t *world, double limit_kw, double *site_kw) {
-    const taper_station_config_t *station = world->run->station;
-    double *group_kw = world->group_kw;
-    for (unsigned g = 0; g < station->group_count; g++) {
-        group_kw[g] = 0.0;
-    }
-    for (unsigned i = 0; i < station->connector_count; i++) {
-        group_kw[station->connectors[i].group] += world->fleet.evse[i].power_kw;
-    }
-    bool violated = false;
-    for (unsigned g = station->group_count; g-- > 0;) { // a parent stands before its children
-        const double own_kw = (double)station->groups[g].limit_W / 1000.0;
-        violated = violated || group_kw[g] > own_kw + LIMIT_TOLERANCE_KW;
-        if (g > 0) {
-            group_kw[station->groups[g].parent] += group_kw[g];
-        }
-    }
-    *site_kw = group_kw[0];
-    return violated || *site_kw > limit_kw + LIMIT_TOLERANCE_KW;
+    return sent && world->bus.to_station.overflows == 0;
 }
 
 /** The vehicles take what they may, and it is all written down. */
 static void draw_power(world_t *world, int64_t now_s) {
     sim_results_t *results = world->results;
+    double connector_kw[TAPER_MAX_CONNECTORS];
     unsigned active = 0;
     for (unsigned i = 0; i < world->run->station->connector_count; i++) {
         const sim_evse_t *evse = &world->fleet.evse[i];
         sim_fleet_draw(&world->fleet, i, (double)now_s);
+        connector_kw[i] = evse->power_kw;
         if (evse->vehicle != NULL) {
             active += sim_evse_wants(evse) ? 1 : 0;
             sim_results_connector(results, now_s, i, evse);
         }
     }
     const double limit_kw = sim_gateway_limit_kw(&world->gateway, now_s);
-    double site_kw = 0.0;
-    results->violation_ticks += is_violated(world, limit_kw, &site_kw) ? 1 : 0;
-    sim_results_step(results, now_s, limit_kw, site_kw, active, taper_station_mode(&world->station));
+    const double excess_kw =
+        sim_groups_excess_kw(world->run->station, connector_kw, limit_kw, world->group_kw);
+    results->violation_ticks += excess_kw > 0.0 ? 1 : 0;
+    sim_results_step(results, now_s, limit_kw, world->group_kw[0], active,
+                     taper_station_mode(&world->station));
     for (unsigned i = 0; i < world->run->station->connector_count; i++) {
         sim_fleet_charge(&world->fleet, i, (double)now_s);
     }
@@ -130,10 +112,11 @@ static void draw_power(world_t *world, int64_t now_s) {
 /** Take note of a solve that the station finished in this tick. */
 static void note_solve(world_t *world) {
     const taper_station_t *station = &world->station;
-    if (station->counters.plans == world->plans) {
+    const uint32_t plans = taper_station_counter(station, TAPER_COUNTER_PLANS);
+    if (plans == world->plans) {
         return;
     }
-    world->plans = station->counters.plans;
+    world->plans = plans;
     sim_samples_add(&world->results->iterations, taper_planner_iterations(&station->planner));
     sim_samples_add(&world->results->solve_ms, station->last_solve_us / 1000.0);
     if (world->run->problems != NULL &&
@@ -142,7 +125,25 @@ static void note_solve(world_t *world) {
     }
 }
 
+/**
+ * What one connector gives up reaches another: setpoints out, echoes in, until nobody waits any more. On a real bus that
+ * takes less than a second; here no time passes.
+ */
+static bool hand_over(world_t *world, uint32_t now_ms) {
+    bool sent = true;
+    for (unsigned round = 0; round < HAND_OVER_ROUNDS && taper_station_hands_over(&world->station); round++) {
+        for (unsigned i = 0; i < world->run->station->connector_count; i++) {
+            sent = sim_fleet_echo(&world->fleet, i) && sent;
+        }
+        taper_station_poll(&world->station, now_ms);
+        sim_fleet_hear(&world->fleet);
+    }
+    return sent;
+}
+
 static bool run_tick(world_t *world, int64_t now_s) {
+    const uint32_t now_ms = (uint32_t)((uint64_t)now_s * 1000U);
+    taper_membus_set_time(&world->bus, now_ms);
     sim_queue_advance(&world->queue, now_s);
     if (!sim_gateway_publish(&world->gateway, &world->station, now_s) || !send_reports(world, now_s)) {
         fprintf(stderr,
@@ -150,9 +151,12 @@ static bool run_tick(world_t *world, int64_t now_s) {
                 (long long)now_s);
         return false;
     }
-    taper_station_step(&world->station, (uint32_t)((uint64_t)now_s * 1000U));
+    taper_station_step(&world->station, now_ms);
     note_solve(world);
     sim_fleet_listen(&world->fleet);
+    if (!hand_over(world, now_ms)) {
+        return false;
+    }
     draw_power(world, now_s);
     return true;
 }
@@ -188,9 +192,11 @@ bool sim_world_run(const sim_case_t *run, sim_results_t *results) {
         world->turn[i] = (uint8_t)i;
     }
     taper_membus_init(&world->bus);
-    sim_fleet_init(&world->fleet, run->station, &world->bus, run->policy->tells_taper, run->seed);
-    sim_gateway_init(&world->gateway, run->limits, &world->bus, world->tick_s, run->seed);
-    sim_queue_init(&world->queue, run->sessions, &world->fleet, results->outcome);
+    world->world_port = taper_membus_world_port(&world->bus);
+    sim_fleet_init(&world->fleet, run->station, &world->world_port, run->policy->tells_taper, run->seed);
+    sim_gateway_init(&world->gateway, run->limits, &world->world_port, world->tick_s, run->seed);
+    sim_queue_init(&world->queue, run->sessions, world->fleet.evse, run->station->connector_count,
+                   results->outcome);
     bool good = init_station(world);
     if (good) {
         if (run->problems != NULL) {
@@ -202,9 +208,9 @@ bool sim_world_run(const sim_case_t *run, sim_results_t *results) {
                 run->station->name);
     }
     sim_queue_finish(&world->queue);
-    results->solves = world->station.counters.plans;
-    results->fallback_ticks = world->station.counters.fallback_ticks;
-    results->guard_violations = world->station.counters.guard_violations;
+    results->solves = taper_station_counter(&world->station, TAPER_COUNTER_PLANS);
+    results->fallback_ticks = taper_station_counter(&world->station, TAPER_COUNTER_FALLBACK_TICKS);
+    results->guard_violations = taper_station_counter(&world->station, TAPER_COUNTER_GUARD_VIOLATIONS);
     sim_queue_free(&world->queue);
     free(world);
     return good;

@@ -5,12 +5,17 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import cantools
 import pytest
+from cantools.database.can import Database
 
 ROOT = Path(__file__).resolve().parents[2]
 CODEGEN = ROOT / "codegen"
 STATIONS = ("hub", "garage", "paper")
 sys.path.insert(0, str(CODEGEN))
+
+from bus_dbc import compact_dbc  # noqa: E402  (found by the path above)
+from bus_model import Bus, read_bus  # noqa: E402
 
 Run = Callable[..., subprocess.CompletedProcess[str]]
 
@@ -38,6 +43,27 @@ def tree(generate: Run, real: str, tmp_path_factory: pytest.TempPathFactory) -> 
     done = generate("--stations", ",".join(STATIONS), "--real", real, "--out", out)
     assert done.returncode == 0, done.stderr
     return out
+
+
+@pytest.fixture(scope="session")
+def bus() -> Bus:
+    return read_bus(CODEGEN / "bus.toml")
+
+
+@pytest.fixture(scope="session")
+def full() -> Database:
+    """The committed database of all connectors, as a CAN tool reads it; loaded once, it is large."""
+    loaded = cantools.database.load_file(CODEGEN / "taper.dbc", strict=True)
+    assert isinstance(loaded, Database)
+    return loaded
+
+
+@pytest.fixture(scope="session")
+def compact(bus: Bus) -> Database:
+    """The database that the codec is made from."""
+    loaded = cantools.database.load_string(compact_dbc(bus), "dbc", strict=True)
+    assert isinstance(loaded, Database)
+    return loaded
 
 
 def content(folder: Path) -> dict[str, bytes]:

@@ -7,18 +7,13 @@ from pathlib import Path
 import dbc
 import pytest
 from bus_dbc import compact_dbc
-from bus_model import read_bus
-from conftest import CODEGEN, compile_c
+from bus_model import Bus
+from conftest import compile_c
 
 
 @pytest.fixture(scope="module")
-def database() -> str:
-    return compact_dbc(read_bus(CODEGEN / "bus.toml"))
-
-
-@pytest.fixture(scope="module")
-def files(database: str) -> dict[str, str]:
-    return dbc.codec_files(database)
+def files(bus: Bus) -> dict[str, str]:
+    return dbc.codec_files(compact_dbc(bus))
 
 
 def test_there_is_no_floating_point_in_it(files: dict[str, str]) -> None:
@@ -26,8 +21,8 @@ def test_there_is_no_floating_point_in_it(files: dict[str, str]) -> None:
         assert not re.search(r"\b(double|float)\b|phys_range", text)
 
 
-def test_the_range_checks_of_raw_values_stay(files: dict[str, str], database: str) -> None:
-    signals = database.count("\n SG_ ")
+def test_the_range_checks_of_raw_values_stay(files: dict[str, str], bus: Bus) -> None:
+    signals = compact_dbc(bus).count("\n SG_ ")
     for text in files.values():
         assert len(re.findall(r"^bool taper_dbc_\w+_is_in_range\(", text, re.MULTILINE)) == signals
     assert "int taper_dbc_setpoint_pack(" in files["taper_dbc.h"]

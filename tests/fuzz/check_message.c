@@ -22,6 +22,10 @@ static void in_range_or_absent(const char *what, int32_t value, int32_t low, int
     }
 }
 
+static void check_emcy(const taper_emcy_t *emcy) {
+    in_range("EMCY.severity", emcy->severity, TAPER_SEVERITY_INFO, TAPER_SEVERITY_FAULT);
+}
+
 static void check_site_limit(const taper_site_limit_t *limit) {
     in_range_or_absent("SITE_LIMIT.limit_W", limit->limit_W, -3276700, 3276700);
     in_range_or_absent("SITE_LIMIT.failsafe_W", limit->failsafe_W, -3276700, 3276700);
@@ -122,6 +126,7 @@ static void check_plan(const taper_plan_t *plan) {
 
 void check_message(const taper_message_t *message) {
     switch (message->kind) {
+    case TAPER_MESSAGE_EMCY: check_emcy(&message->as.emcy); break;
     case TAPER_MESSAGE_SITE_LIMIT: check_site_limit(&message->as.site_limit); break;
     case TAPER_MESSAGE_SETPOINT: check_setpoint_ranges(&message->as.setpoint); break;
     case TAPER_MESSAGE_EVSE_STATUS: check_evse_status(&message->as.evse_status); break;
@@ -136,6 +141,7 @@ void check_message(const taper_message_t *message) {
     case TAPER_MESSAGE_EV_PARAM_D: check_param_d(&message->as.ev_param_d); break;
     case TAPER_MESSAGE_EVSE_INFO: check_evse_info(&message->as.evse_info); break;
     case TAPER_MESSAGE_PLAN: check_plan(&message->as.plan); break;
-    default: break; /* EMCY and CTRL_DIAG are full-range integers */
+    case TAPER_MESSAGE_CTRL_DIAG: break; /* integers of full range */
+    default: check_that(false, "decoded as", (int)message->kind); break;
     }
 }

@@ -1,8 +1,10 @@
 /* What the station may hold after a tick, found from its headers and from nothing that it computes itself. */
 #include "check.h"
 
-/** Greatest departure: 22 days and what the clock is carried on by, or the default stay. [s] */
-#define FURTHEST_DEPARTURE_s (46 * 24 * 3600)
+/** Departures: told ones lie up to half of 65535 minutes away; a stay that was assumed ends when it began long ago, at most
+    the turn of the clock (49.7 days). */
+#define LATEST_DEPARTURE_s   (65535 / 2 * 60)
+#define EARLIEST_DEPARTURE_s (-(int32_t)(UINT32_MAX / 1000u))
 
 static void check_as(taper_message_kind_t kind, const taper_message_t *message) {
     taper_message_t copy = *message;
@@ -39,6 +41,8 @@ static void check_session(const taper_session_t *session) {
     check_as(TAPER_MESSAGE_EV_STATUS, &message);
     message.as.evse_elec = session->elec;
     check_as(TAPER_MESSAGE_EVSE_ELEC, &message);
+    message.as.evse_info = session->info;
+    check_as(TAPER_MESSAGE_EVSE_INFO, &message);
     check_params(&session->received, session->param_seen);
     check_that(!session->in_session || session->vehicle_there, "session without a vehicle", 1);
     if (session->in_session) {
@@ -72,6 +76,8 @@ static void check_limits(const taper_station_t *station) {
             k == 0 || !taper_time_reached(limits->curve.point[k - 1].time_ms, limits->curve.point[k].time_ms),
             "curve out of order at", k);
     }
+    check_that(limits->metered_W >= 0, "metered_W", limits->metered_W);
+    check_that(station->limit_now.other_W >= 0, "limit_now.other_W", station->limit_now.other_W);
     check_that(station->limit_now.site_W >= 0 && station->limit_now.site_W <= site_W, "limit_now.site_W",
                station->limit_now.site_W);
 }
@@ -79,7 +85,8 @@ static void check_limits(const taper_station_t *station) {
 static void check_no_demand(const taper_demand_t *demand) {
     check_that(demand->stored_Wh == 0 && demand->capacity_Wh == 0 && demand->need_Wh == 0 &&
                    demand->peak_W == 0 && demand->taper_W == 0 && demand->max_mA == 0 &&
-                   demand->min_mA == 0 && demand->W_per_A == 0 && demand->departs_in_s == 0,
+                   demand->min_mA == 0 && demand->W_per_A == 0 && demand->booked_W_per_A == 0 &&
+                   demand->departs_in_s == 0,
                "a demand that is not active, yet not zero", 1);
 }
 
@@ -97,7 +104,9 @@ static void check_demand(const taper_connector_config_t *connector, const taper_
     check_that(demand->min_mA >= connector->min_mA && demand->min_mA <= 127000, "demand.min_mA",
                demand->min_mA);
     check_that(demand->W_per_A > 0 && demand->W_per_A <= 3 * 6554, "demand.W_per_A", demand->W_per_A);
-    check_that(demand->departs_in_s >= -FURTHEST_DEPARTURE_s && demand->departs_in_s <= FURTHEST_DEPARTURE_s,
+    check_that(demand->booked_W_per_A >= demand->W_per_A && demand->booked_W_per_A <= 3 * 6554,
+               "demand.booked_W_per_A", demand->booked_W_per_A);
+    check_that(demand->departs_in_s >= EARLIEST_DEPARTURE_s && demand->departs_in_s <= LATEST_DEPARTURE_s,
                "demand.departs_in_s", demand->departs_in_s);
 }
 
@@ -115,12 +124,12 @@ static void check_current(const taper_connector_config_t *connector, const taper
 }
 
 /** Sums over every connector below a group, by climbing from each of them. */
-static void check_groups(const taper_station_t *station) {
+static void check_groups(const taper_station_t *station, const taper_setpoints_t *setpoints) {
     const taper_station_config_t *config = station->options.config;
     int64_t sum_mW[TAPER_MAX_GROUPS] = {0};
     for (uint8_t i = 0; i < config->connector_count; i++) {
         const int64_t draw_mW =
-            (int64_t)station->setpoints.current_mA[i] * station->snapshot.demand[i].W_per_A;
+            (int64_t)setpoints->current_mA[i] * station->snapshot.demand[i].booked_W_per_A;
         for (uint8_t k = config->connectors[i].group; k != TAPER_NO_GROUP; k = config->groups[k].parent) {
             sum_mW[k] += draw_mW;
         }
@@ -132,6 +141,31 @@ static void check_groups(const taper_station_t *station) {
     check_that(sum_mW[0] <= (int64_t)station->limit_now.site_W * 1000, "power of the site [mW]", sum_mW[0]);
 }
 
+void check_currents(const taper_station_t *station) {
+    const taper_station_config_t *config = station->options.config;
+    for (uint8_t i = 0; i < config->connector_count; i++) {
+        const taper_demand_t *demand = &station->snapshot.demand[i];
+        const int32_t current_mA = station->setpoints.current_mA[i];
+        check_current(&config->connectors[i], demand, current_mA);
+        check_that(current_mA <= station->target.current_mA[i], "current above the target", current_mA);
+        check_that(taper_ledger_may_mA(&station->ledger, i) <= config->connectors[i].max_mA,
+                   "what a connector may draw", taper_ledger_may_mA(&station->ledger, i));
+    }
+    check_groups(station, &station->target);
+    check_groups(station, &station->setpoints);
+    check_that(taper_station_counter(station, TAPER_COUNTER_GUARD_VIOLATIONS) == 0, "guard violations",
+               taper_station_counter(station, TAPER_COUNTER_GUARD_VIOLATIONS));
+}
+
+static void check_identifier(const char *identifier) {
+    size_t length = 0;
+    for (; identifier[length] != '\0'; length++) {
+        check_that(length < TAPER_IDENTIFIER_LENGTH, "length of an identifier", (long long)length);
+        check_that(identifier[length] >= ' ' && identifier[length] <= '~', "character of an identifier",
+                   identifier[length]);
+    }
+}
+
 void check_station(const taper_station_t *station) {
     const taper_station_config_t *config = station->options.config;
     check_limits(station);
@@ -139,16 +173,14 @@ void check_station(const taper_station_t *station) {
     for (uint8_t i = 0; i < config->connector_count; i++) {
         const taper_demand_t *demand = &station->snapshot.demand[i];
         check_session(&station->sessions.session[i]);
+        check_identifier(taper_transfers_identifier(&station->transfers, i));
         if (demand->active) {
             check_demand(&config->connectors[i], demand);
         } else {
             check_no_demand(demand);
         }
-        check_current(&config->connectors[i], demand, station->setpoints.current_mA[i]);
     }
-    check_groups(station);
-    check_that(station->counters.guard_violations == 0, "guard_violations",
-               station->counters.guard_violations);
+    check_currents(station);
 }
 
 void check_setpoint(const taper_station_config_t *config, const taper_message_t *message) {

@@ -36,6 +36,13 @@ static const taper_station_config_t *hub(void) {
     return NULL;
 }
 
+static void start_station(void) {
+    const taper_station_options_t options = {
+        .config = hub(), .port = &world.port, .iterations_per_tick = TAPER_MIN_SLICE};
+    const taper_status_t status = taper_station_init(&world.station, &options);
+    check_that(status == TAPER_OK, "status of taper_station_init()", status);
+}
+
 static void begin(void) {
     memset(world.counter, 0, sizeof world.counter);
     memset(world.mirror, 0, sizeof world.mirror);
@@ -43,10 +50,7 @@ static void begin(void) {
     world.port = taper_membus_station_port(&world.bus);
     world.now_ms = 0u - START_BEFORE_WRAP_ms;
     taper_membus_set_time(&world.bus, world.now_ms);
-    const taper_station_options_t options = {
-        .config = hub(), .port = &world.port, .iterations_per_tick = TAPER_MIN_SLICE};
-    const taper_status_t status = taper_station_init(&world.station, &options);
-    check_that(status == TAPER_OK, "status of taper_station_init()", status);
+    start_station();
 }
 
 /** Sort a frame as a receiver should, and check what it decodes to. */
@@ -118,6 +122,13 @@ static void step(void) {
     account_for_step();
 }
 
+static void poll(void) {
+    taper_station_poll(&world.station, world.now_ms);
+    fuzz_stats.polls++;
+    check_currents(&world.station);
+    hear_answers();
+}
+
 static void pass_ms(uint32_t ms) {
     world.now_ms += ms;
     taper_membus_set_time(&world.bus, world.now_ms);
@@ -134,6 +145,7 @@ static void pass_time(uint8_t code) {
         step();
     } else if (code > FUZZ_TIME_STANDS) {
         pass_ms(code);
+        poll();
     }
 }
 
@@ -173,7 +185,7 @@ static uint32_t crc32(const uint8_t *data, size_t length) {
     return ~crc;
 }
 
-/** Send `length` bytes (> 7) over ISO-TP as a sender that hears every flow control would. */
+/** Send `length` bytes (> 7) over ISO-TP, with the gaps and pauses that the station asks for. */
 static void send_message(const taper_frame_t *like, const uint8_t *message, unsigned length) {
     taper_frame_t frame = *like;
     frame.length = TAPER_FRAME_LENGTH;
@@ -182,6 +194,7 @@ static void send_message(const taper_frame_t *like, const uint8_t *message, unsi
     memcpy(frame.data + 2, message, 6);
     deliver(&frame);
     pass_ms(2);
+    poll();
     for (unsigned sent = 6, sequence = 1; sent < length; sent += 7, sequence++) {
         const unsigned part = length - sent < 7 ? length - sent : 7;
         frame.data[0] = (uint8_t)(0x20u | (sequence & 0x0Fu));
@@ -189,8 +202,12 @@ static void send_message(const taper_frame_t *like, const uint8_t *message, unsi
         memcpy(frame.data + 1, message + sent, part);
         frame.time_ms = world.now_ms;
         deliver(&frame);
-        pass_ms(1);
+        pass_ms(TAPER_TRANSFER_SEPARATION_ms);
+        if (sequence % TAPER_TRANSFER_BLOCK_SIZE == 0) {
+            poll();
+        }
     }
+    poll();
 }
 
 /** @return how many records behind this one were its content. */
@@ -217,15 +234,25 @@ static size_t feed_transfer(const uint8_t *record, size_t records_left) {
 }
 
 static void add_counters(void) {
-    const taper_station_counters_t *of = &world.station.counters;
-    taper_station_counters_t *sum = &fuzz_stats.station;
-    sum->frames_received += of->frames_received;
-    sum->frames_unknown += of->frames_unknown;
-    sum->crc_errors += of->crc_errors;
-    sum->frames_repeated += of->frames_repeated;
-    sum->frames_lost += of->frames_lost;
-    sum->frames_untrusted += of->frames_untrusted;
-    sum->bad_fields += of->bad_fields;
+    for (unsigned k = 0; k < TAPER_COUNTERS; k++) {
+        fuzz_stats.station[k] += taper_station_counter(&world.station, (taper_counter_t)k);
+    }
+}
+
+static void feed_event(const uint8_t *record) {
+    const uint8_t detail = record[5];
+    fuzz_stats.events++;
+    switch (record[4] % FUZZ_EVENTS) {
+    case FUZZ_BUS_OFF: taper_membus_bus_off(&world.bus, 0, detail); break;
+    case FUZZ_BUS_ON: taper_membus_bus_on(&world.bus, 0); break;
+    case FUZZ_POWER:
+        add_counters();
+        taper_membus_power_cycle(&world.bus);
+        start_station();
+        break;
+    case FUZZ_TEAR_WRITE: taper_membus_tear_next_write(&world.bus, detail); break;
+    default: taper_membus_rot(&world.bus, record[6], detail); break;
+    }
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
@@ -233,7 +260,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     begin();
     for (size_t k = 0; k < records; k++) {
         const uint8_t *record = data + k * FUZZ_RECORD;
-        if ((record[0] & FUZZ_TRANSFER) != 0) {
+        if ((record[0] & FUZZ_EVENT) != 0) {
+            feed_event(record);
+        } else if ((record[0] & FUZZ_TRANSFER) != 0) {
             k += feed_transfer(record, records - k - 1);
         } else {
             feed_frame(record);

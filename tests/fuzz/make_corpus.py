@@ -12,7 +12,8 @@ import struct
 import sys
 from pathlib import Path
 
-PROTECT, COUNT, TRANSFER = 1, 2, 4
+PROTECT, COUNT, TRANSFER, EVENT = 1, 2, 4, 8
+BUS_OFF, BUS_ON, POWER, TEAR_WRITE, ROT = range(5)
 TICK, JUMP = 200, 250  # what passes: from here on seconds, or 10 min, 2 h, 1, 6, 23, 40 days; below: milliseconds
 GATEWAY, TOOL = 62, 63
 ABSENT8, ABSENT16, ABSENT_S16 = 0xFF, 0xFFFF, 0x8000
@@ -122,6 +123,10 @@ def raw_isotp(*frames: str, node: int = GATEWAY) -> bytes:
     return b"".join(record(ISOTP_FROM << 6 | node, bytes.fromhex(text), then=5, flags=0) for text in frames)
 
 
+def event(what: int, detail: int = 0, copy: int = 0, then: int = 0) -> bytes:
+    return record(0, bytes([what, detail, copy]), then, EVENT)
+
+
 GOLDEN = ("7610a000060c0707", "670f000006000707")
 
 
@@ -155,6 +160,11 @@ def faults() -> dict[str, bytes]:
                                                         (1, 2**32 - 1, 600000, 2**31)) + again,
         "clock-wraps": charging(30),
         "long-pause": one + b"".join(evse_status(1, then=JUMP + k) + charging(2) for k in range(6)),
+        "bus-off": one + event(BUS_OFF, 2, then=TICK) + charging(4) + event(BUS_OFF, then=TICK + 3) + charging(2)
+        + event(BUS_ON) + again,
+        "power-fails": one + event(POWER, then=TICK) + again + event(TEAR_WRITE, 7)
+        + frame("site_limit", struct.pack("<hhBB", 400, 90, 12, 60), nibble=1, then=JUMP) + charging(1) + event(POWER)
+        + charging(2) + event(ROT, 40) + event(ROT, 41, 1) + event(POWER) + charging(2),
         "protocol-version": one + info(1, version=2) + info(1, rotation=0) + info(1, rotation=7) + again,
     }  # fmt: skip
 
@@ -164,17 +174,27 @@ def transfers() -> dict[str, bytes]:
     return {
         "curve": charging(2) + transfer(1, curve(8), 8) + charging(3),
         "curve-out-of-order": charging(2) + transfer(1, curve(4)[::-1], 4) + transfer(1, curve(4), 5),
-        "identifiers": charging(2) + transfer(3, b"DE*ABC*E1234567*", 16, 1) + transfer(5, b"", 0, TOOL) + charging(2),
+        "identifiers": charging(2) + transfer(3, b"DE*ABC*E1234567*", 16, 1) + transfer(5, b"", 0, TOOL)
+        + raw_isotp("3000000000000000", node=TOOL) * 3 + charging(2),
         "isotp-nonsense": charging(1) + raw_isotp(*torn, "1fff010100000000", "30000000000000", "32ffff0000000000",
                                                   "0801020304050607", "0000000000000000", "f000000000000000")
         + raw_isotp("0301020304050607", node=1) + charging(1),
     }  # fmt: skip
 
 
+EDGES = {
+    "gateway": "site_limit site_meter time_sync",
+    "evse": "evse_status evse_elec evse_info emcy",
+    "ev-status": "ev_status",
+    "ev-param": "ev_param_a ev_param_b ev_param_c ev_param_d",
+    "controller": "setpoint ctrl_status plan ctrl_diag",
+}
+
+
 def corpus() -> dict[str, bytes]:
     files = {"golden": b"".join(record(0x0C1, bytes.fromhex(text), 10, 0) for text in GOLDEN) + charging(1)}
     files["eight-vehicles"] = site(600) + b"".join(vehicle(node) for node in range(1, 9)) + evse_status(1, then=TICK) * 2
-    files |= {f"edges-{name.replace('_', '-')}": edges(name) for name in FUNCTIONS if name not in ("plan", "ctrl_diag")}
+    files |= {f"edges-{group}": b"".join(edges(name) for name in names.split()) for group, names in EDGES.items()}
     return files | faults() | transfers()
 
 

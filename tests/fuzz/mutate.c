@@ -7,7 +7,8 @@
 
 #define LONGEST_STRETCH 48u
 /** Time passes rarely in random records: frames are what is tested, and ticks cost a hundred of them. */
-#define TIME_IN 32u
+#define TIME_IN  32u
+#define EVENT_IN 8u
 
 uint64_t mutate_random(uint64_t *state) {
     uint64_t z = *state += UINT64_C(0x9E3779B97F4A7C15);
@@ -69,6 +70,18 @@ static void randomise(uint64_t *state, uint8_t *record) {
     }
 }
 
+/** Rarely something that happens to the station: it ends what the frames before have built up. */
+static void happen(uint64_t *state, uint8_t *record) {
+    if (below(state, EVENT_IN) != 0) {
+        randomise(state, record);
+        return;
+    }
+    record[0] = FUZZ_EVENT;
+    record[4] = (uint8_t)below(state, FUZZ_EVENTS);
+    record[5] = (uint8_t)below(state, 4) == 0 ? (uint8_t)mutate_random(state) : (uint8_t)below(state, 20);
+    record[6] = (uint8_t)below(state, TAPER_STORE_COPIES);
+}
+
 static void change_record(uint64_t *state, uint8_t *record) {
     switch (below(state, 16)) {
     case 0: change_id(state, record); break;
@@ -78,8 +91,8 @@ static void change_record(uint64_t *state, uint8_t *record) {
     case 4:
         record[3] = below(state, TIME_IN) == 0 ? (uint8_t)mutate_random(state) : (uint8_t)below(state, 200);
         break;
-    case 5:
-    case 6: randomise(state, record); break;
+    case 5: randomise(state, record); break;
+    case 6: happen(state, record); break;
     default: change_data(state, record + 4); break;
     }
 }

@@ -90,6 +90,30 @@ static void run_mutations(uint64_t frames, uint64_t seed) {
     }
 }
 
+static const char *const counter_name[TAPER_COUNTERS] = {
+    [TAPER_COUNTER_FRAMES_RECEIVED] = "station: frames received",
+    [TAPER_COUNTER_FRAMES_SENT] = "station: frames sent",
+    [TAPER_COUNTER_FRAMES_UNKNOWN] = "station: frames unknown",
+    [TAPER_COUNTER_CRC_ERRORS] = "station: crc errors",
+    [TAPER_COUNTER_FRAMES_REPEATED] = "station: frames repeated",
+    [TAPER_COUNTER_FRAMES_LOST] = "station: frames lost",
+    [TAPER_COUNTER_FRAMES_UNTRUSTED] = "station: frames untrusted",
+    [TAPER_COUNTER_FRAMES_BABBLED] = "station: frames babbled",
+    [TAPER_COUNTER_BAD_FIELDS] = "station: bad fields",
+    [TAPER_COUNTER_RECEIVE_OVERFLOWS] = "station: receive overflows",
+    [TAPER_COUNTER_SEND_REFUSED] = "station: send refused",
+    [TAPER_COUNTER_BUS_OFF] = "station: bus off",
+    [TAPER_COUNTER_PLANS] = "station: plans",
+    [TAPER_COUNTER_PLANS_REJECTED] = "station: plans rejected",
+    [TAPER_COUNTER_FALLBACK_TICKS] = "station: fallback ticks",
+    [TAPER_COUNTER_GUARD_VIOLATIONS] = "station: guard violations",
+    [TAPER_COUNTER_CLOCK_JUMPS] = "station: clock jumps",
+    [TAPER_COUNTER_SOC_JUMPS] = "station: soc jumps",
+    [TAPER_COUNTER_PARAMETERS_REPAIRED] = "station: parameters repaired",
+    [TAPER_COUNTER_TRANSFERS] = "station: transfers",
+    [TAPER_COUNTER_TRANSFERS_REFUSED] = "station: transfers refused",
+};
+
 static void line(const char *what, uint64_t count) {
     printf("%-34s %12" PRIu64 "\n", what, count);
 }
@@ -110,17 +134,16 @@ static void print_account(double seconds) {
     }
     line("ISO-TP frames", of->isotp_frames);
     line("whole transfers", of->transfers);
+    line("events at the station", of->events);
+    line("polls", of->polls);
     line("control ticks", of->steps);
     line("  connectors in session", of->sessions);
     line("  vehicles that want energy", of->demands);
     line("  connectors with current", of->currents);
     line("frames that the station sent", of->answers);
-    line("station: CRC errors", of->station.crc_errors);
-    line("station: repeated", of->station.frames_repeated);
-    line("station: lost", of->station.frames_lost);
-    line("station: sender not trusted", of->station.frames_untrusted);
-    line("station: unknown", of->station.frames_unknown);
-    line("station: bad fields", of->station.bad_fields);
+    for (unsigned k = 0; k < TAPER_COUNTERS; k++) {
+        line(counter_name[k], of->station[k]);
+    }
 }
 
 static uint64_t number(const char *text) {

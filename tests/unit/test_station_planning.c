@@ -24,7 +24,7 @@ static void test_a_soc_frame_in_gives_a_setpoint_frame_out_through_every_hop(voi
     bench_assert_one_vehicle_in_the_snapshot();
     TEST_ASSERT_EQUAL(TAPER_VERDICT_SOLVED, bench.station.planner.verdict);
     TEST_ASSERT_EQUAL(TAPER_MODE_PLAN, taper_station_mode(&bench.station));
-    TEST_ASSERT_INT32_WITHIN(80, 8000, bench.station.plan_W[0]); /* 11 kW - half of 6 kW, within tolerance */
+    TEST_ASSERT_INT32_WITHIN(80, 8000, bench.station.plan_W[0][0]); /* 11 kW - half of 6 kW, within tolerance */
     TEST_ASSERT_EQUAL_INT32(8000, bench.station.proposal.ceiling_W[0]);
     /* 8000 W / 690 V = 11.594 A, up to the step */
     TEST_ASSERT_EQUAL_INT32(11600, bench.station.setpoints.current_mA[0]);
@@ -34,7 +34,7 @@ static void test_a_soc_frame_in_gives_a_setpoint_frame_out_through_every_hop(voi
     TEST_ASSERT_EQUAL_INT32(11600, setpoint.current_mA);
     TEST_ASSERT_EQUAL_UINT8(7, setpoint.session);
     TEST_ASSERT_EQUAL_UINT8(7, setpoint.phase_mask);
-    TEST_ASSERT_EQUAL_UINT32(0, bench.station.counters.guard_violations);
+    TEST_ASSERT_EQUAL_UINT32(0, taper_station_counter(&bench.station, TAPER_COUNTER_GUARD_VIOLATIONS));
 }
 
 static void test_sliced_planning_charges_by_fallback_until_the_plan_is_there(void) {
@@ -50,7 +50,7 @@ static void test_sliced_planning_charges_by_fallback_until_the_plan_is_there(voi
         bench_step();
     }
     TEST_ASSERT_EQUAL(TAPER_MODE_PLAN, taper_station_mode(&bench.station));
-    TEST_ASSERT_EQUAL_UINT32(1, bench.station.counters.plans);
+    TEST_ASSERT_EQUAL_UINT32(1, taper_station_counter(&bench.station, TAPER_COUNTER_PLANS));
 }
 
 /** A NaN in the solver's memory, as a bit flip would leave it. */
@@ -76,7 +76,7 @@ static void leave_a_solve_unfinished(void) {
 static void test_while_a_renewal_is_in_work_the_plan_is_followed(void) {
     leave_a_solve_unfinished();
     TEST_ASSERT_EQUAL(TAPER_MODE_PLAN, taper_station_mode(&bench.station));
-    TEST_ASSERT_EQUAL_UINT32(1, bench.station.counters.plans);
+    TEST_ASSERT_EQUAL_UINT32(1, taper_station_counter(&bench.station, TAPER_COUNTER_PLANS));
 }
 
 static void test_a_poisoned_solver_means_fallback_in_the_same_tick_and_a_new_try_after_a_minute(void) {
@@ -86,7 +86,7 @@ static void test_a_poisoned_solver_means_fallback_in_the_same_tick_and_a_new_try
     bench_step();
     TEST_ASSERT_EQUAL(TAPER_VERDICT_NOT_FINITE, bench.station.planner.verdict);
     TEST_ASSERT_EQUAL(TAPER_MODE_FALLBACK, taper_station_mode(&bench.station));
-    TEST_ASSERT_EQUAL_UINT32(1, bench.station.counters.plans_rejected);
+    TEST_ASSERT_EQUAL_UINT32(1, taper_station_counter(&bench.station, TAPER_COUNTER_PLANS_REJECTED));
     TEST_ASSERT_GREATER_THAN_INT32(0, bench.station.setpoints.current_mA[0]);
 
     bench.station.options.iterations_per_tick = TAPER_MAX_ITERATIONS;
@@ -97,8 +97,8 @@ static void test_a_poisoned_solver_means_fallback_in_the_same_tick_and_a_new_try
     bench_send_all(8, 9000);
     bench_step();
     TEST_ASSERT_EQUAL(TAPER_MODE_PLAN, taper_station_mode(&bench.station));
-    TEST_ASSERT_EQUAL_UINT32(1, bench.station.counters.plans_rejected);
-    TEST_ASSERT_EQUAL_UINT32(0, bench.station.counters.guard_violations);
+    TEST_ASSERT_EQUAL_UINT32(1, taper_station_counter(&bench.station, TAPER_COUNTER_PLANS_REJECTED));
+    TEST_ASSERT_EQUAL_UINT32(0, taper_station_counter(&bench.station, TAPER_COUNTER_GUARD_VIOLATIONS));
 }
 
 static void test_a_plan_ends_after_two_steps_without_a_renewal(void) {

@@ -8,6 +8,15 @@ set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 # Float results equal to the bit on every target need every multiplication and addition to round on its own.
 add_compile_options(-ffp-contract=off)
 
+if(TAPER_FUZZ)
+    if(NOT CMAKE_C_COMPILER_ID MATCHES "Clang")
+        message(FATAL_ERROR "TAPER_FUZZ needs clang and its libFuzzer: configure with CC=clang (tests/fuzz/README.md)")
+    endif()
+    set(TAPER_SANITIZE ON)
+    add_compile_options(-fsanitize=fuzzer-no-link)
+    add_link_options(-fsanitize=fuzzer-no-link)
+endif()
+
 if(TAPER_SANITIZE)
     add_compile_options(-fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)
     add_link_options(-fsanitize=address,undefined)

@@ -16,4 +16,4 @@ endif()
 
 add_library(unity STATIC ${unity_dir}/unity.c)
 target_include_directories(unity SYSTEM PUBLIC ${unity_dir})
-target_compile_definitions(unity PUBLIC UNITY_SUPPORT_64)
+target_compile_definitions(unity PUBLIC UNITY_SUPPORT_64 UNITY_INCLUDE_DOUBLE)

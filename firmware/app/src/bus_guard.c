@@ -56,8 +56,6 @@ static void update_one(taper_station_t *station, uint8_t bus, uint32_t now_ms) {
         }
     } else if (is_off && !restarting) {
         leave_alone(station, bus, TAPER_EVENT_BUS_OFF, now_ms);
-    } else if (guard->refusing && taper_elapsed_ms(now_ms, guard->refusing_since_ms) >= BLOCKED_ms) {
-        leave_alone(station, bus, TAPER_EVENT_SEND_BLOCKED, now_ms);
     }
 }
 
@@ -72,6 +70,15 @@ void taper_bus_guard_update(taper_station_t *station, uint32_t now_ms) {
     }
 }
 
+static void note_refusal(taper_station_t *station, uint8_t bus, uint32_t now_ms) {
+    taper_bus_guard_t *guard = &station->bus[bus];
+    if (!guard->refusing) {
+        guard->refusing_since_ms = now_ms;
+    } else if (taper_elapsed_ms(now_ms, guard->refusing_since_ms) >= BLOCKED_ms) {
+        leave_alone(station, bus, TAPER_EVENT_SEND_BLOCKED, now_ms);
+    }
+}
+
 bool taper_bus_guard_send(taper_station_t *station, const taper_frame_t *frame, uint32_t now_ms) {
     const taper_port_t *port = station->options.port;
     taper_bus_guard_t *guard = &station->bus[frame->bus];
@@ -80,9 +87,9 @@ bool taper_bus_guard_send(taper_station_t *station, const taper_frame_t *frame, 
     }
     const bool taken = port->send(port->context, frame);
     taper_station_count(station, taken ? TAPER_COUNTER_FRAMES_SENT : TAPER_COUNTER_SEND_REFUSED);
-    if (!taken && !guard->refusing) {
-        guard->refusing_since_ms = now_ms;
+    if (!taken) {
+        note_refusal(station, frame->bus, now_ms);
     }
-    guard->refusing = !taken;
+    guard->refusing = !taken && !guard->silent;
     return taken;
 }

@@ -49,7 +49,7 @@ taper_status_t taper_station_init(taper_station_t *station, const taper_station_
 static void note_mode(taper_station_t *station, taper_mode_t before) {
     const taper_mode_t mode = station->supervisor.mode;
     if (mode != before) {
-        taper_event_note(&station->events, TAPER_EVENT_MODE, 0, 0, mode);
+        taper_event_note(&station->events, TAPER_EVENT_MODE, 0, 0, (int32_t)mode);
     }
     if (mode == TAPER_MODE_FALLBACK || mode == TAPER_MODE_FAILSAFE) {
         taper_station_count(station, TAPER_COUNTER_FALLBACK_TICKS);
@@ -109,10 +109,14 @@ static void grant(taper_station_t *station, taper_setpoints_t *granted) {
     }
 }
 
+bool taper_station_hands_over(const taper_station_t *station) {
+    return memcmp(&station->target, &station->setpoints, sizeof station->target) != 0;
+}
+
 /** Grant again, between ticks: what changed is due. */
 static void regrant(taper_station_t *station) {
     taper_setpoints_t granted;
-    if (memcmp(&station->target, &station->setpoints, sizeof granted) == 0) {
+    if (!taper_station_hands_over(station)) {
         return;
     }
     grant(station, &granted);

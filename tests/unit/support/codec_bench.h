@@ -6,7 +6,7 @@
 
 #include "taper/codec.h"
 
-#define CODEC_BENCH_KINDS 11
+#define CODEC_BENCH_KINDS 16
 /** Every kind of message. */
 extern const taper_message_kind_t codec_bench_kinds[CODEC_BENCH_KINDS];
 
@@ -21,6 +21,11 @@ taper_frame_t codec_bench_encode(const taper_message_t *message);
 
 /** No field may be bad. */
 taper_message_t codec_bench_decode(const taper_frame_t *frame);
+
+/** Ten kinds of connectors, five of one node, and EMCY of connectors, gateway and controller. */
+#define CODEC_BENCH_IDS (10 * 60 + 5 + 62)
+/** Every identifier that is decoded; fails the running test if there are not so many. */
+void codec_bench_identifiers(uint16_t ids[CODEC_BENCH_IDS]);
 
 /** The all-zero message as a frame. */
 taper_frame_t codec_bench_frame_of(taper_message_kind_t kind);

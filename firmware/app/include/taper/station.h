@@ -192,6 +192,9 @@ const taper_event_log_t *taper_station_events(const taper_station_t *station);
 /** Why a connector has the current that it has, by the last step. */
 taper_reason_t taper_station_reason(const taper_station_t *station, uint8_t connector);
 
+/** Whether some connector waits for what another has yet to give up: the next poll may have more for it. */
+bool taper_station_hands_over(const taper_station_t *station);
+
 /** Mode of the last step. */
 taper_mode_t taper_station_mode(const taper_station_t *station);
 

@@ -110,6 +110,20 @@ taper_port_t taper_membus_station_port(taper_membus_t *bus) {
     return port;
 }
 
+static bool world_receive(void *context, taper_frame_t *frame) {
+    return taper_membus_world_receive(context, frame);
+}
+
+static bool world_send(void *context, const taper_frame_t *frame) {
+    (void)taper_membus_world_send(context, frame); /* a full queue lost another frame, not this one */
+    return true;
+}
+
+taper_port_t taper_membus_world_port(taper_membus_t *bus) {
+    const taper_port_t port = {.context = bus, .receive = world_receive, .send = world_send};
+    return port;
+}
+
 bool taper_membus_world_receive(taper_membus_t *bus, taper_frame_t *frame) {
     return take(&bus->to_world, frame);
 }

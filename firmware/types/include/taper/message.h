@@ -1,5 +1,5 @@
 /**
- * The station bus after decoding: one struct per frame of `codegen/taper.dbc`, in integers with units.
+ * The station bus after decoding: one struct per frame of `codegen/bus.toml`, in integers with units.
  *
  * A field that its sender left out, or that was outside the range of the DBC, is TAPER_ABSENT. Everything else is in
  * the range given here: this is the trust boundary, the layers above check no range again.

@@ -71,6 +71,9 @@ void taper_membus_set_time(taper_membus_t *bus, uint32_t now_ms);
 /** The station's end as a port (no watchdog, no microseconds). `bus` must outlive it. */
 taper_port_t taper_membus_station_port(taper_membus_t *bus);
 
+/** The world's end as a port of the same kind. It takes every frame: see taper_membus_world_send(). */
+taper_port_t taper_membus_world_port(taper_membus_t *bus);
+
 /** The world's end. @return false: nothing waiting. */
 bool taper_membus_world_receive(taper_membus_t *bus, taper_frame_t *frame);
 
