@@ -370,10 +370,10 @@ def test_what_the_kernel_drops_is_counted(probe):
     assert sender.ask("flood 0 20000") == "sent 20000"
     kept = len(port.take())
     assert kept < 20000
-    assert sender.ask("flood 0 1") == "sent 1"  # the kernel tells its count with the next frame
+    assert sender.ask("flood 0 2") == "sent 2"  # the kernel tells its count, of all so far, with each further frame
     kept += len(port.take())
-    assert port.counters()["kernel_drops"] == 20001 - kept - port.counters()["queue_drops"]
-    assert int(port.ask("overflows 0")) == 20001 - kept
+    assert port.counters()["kernel_drops"] == 20002 - kept - port.counters()["queue_drops"]
+    assert int(port.ask("overflows 0")) == 20002 - kept
 
 
 def test_a_slow_bus_refuses_frames_instead_of_making_them_old(probe, bus):
