@@ -1,6 +1,10 @@
+#define _GNU_SOURCE // program_invocation_short_name
+
 #include "limits_csv.h"
 
+#include <errno.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 
 #include "csv_table.h"
@@ -99,6 +103,19 @@ double sim_limits_least_kw(const sim_limits_t *limits, double from_s, double to_
         least = fmin(least, limits->limit_kw[i]);
     }
     return least;
+}
+
+bool sim_limits_choose(sim_limits_t *limits, const char *file, double limit_kw, double station_kw) {
+    if (file == NULL) {
+        sim_limits_constant(limits, limit_kw >= 0.0 ? limit_kw : station_kw);
+    } else if (!sim_limits_load(limits, file)) {
+        return false;
+    }
+    if (sim_limits_cap(limits, station_kw)) {
+        fprintf(stderr, "%s: note: the limit is above the station's own, %g kW, which holds\n",
+                program_invocation_short_name, station_kw);
+    }
+    return true;
 }
 
 void sim_limits_free(sim_limits_t *limits) {

@@ -21,6 +21,13 @@ void sim_limits_constant(sim_limits_t *limits, double limit_kw);
  */
 bool sim_limits_load(sim_limits_t *limits, const char *file);
 
+/**
+ * The limits of a run: of `file`; without one (NULL) `limit_kw` always, and if that is negative `station_kw`. None of them
+ * stays above `station_kw`, with a note on stderr if one was.
+ * @return false, after one line on stderr. Else free with sim_limits_free().
+ */
+bool sim_limits_choose(sim_limits_t *limits, const char *file, double limit_kw, double station_kw);
+
 /** No value stays above `most_kw`. @return whether one was. */
 bool sim_limits_cap(sim_limits_t *limits, double most_kw);
 

@@ -37,22 +37,6 @@ static station_copy_t copy_station(const sim_options_t *options) {
     return copy;
 }
 
-/** The site limit of the run: what was asked for, nowhere above the station's own. */
-static bool load_limits(sim_limits_t *limits, const sim_options_t *options, double station_kw) {
-    if (options->limit_file != NULL) {
-        if (!sim_limits_load(limits, options->limit_file)) {
-            return false;
-        }
-    } else {
-        sim_limits_constant(limits, options->limit_kw >= 0.0 ? options->limit_kw : station_kw);
-    }
-    if (sim_limits_cap(limits, station_kw)) {
-        fprintf(stderr, "taper-sim: note: the limit is above the station's own, %g kW, which holds\n",
-                station_kw);
-    }
-    return true;
-}
-
 /** Run and put the results out. @return the exit code of the program. */
 static int run_case(const sim_options_t *options, const sim_case_t *run) {
     sim_results_t results;
@@ -106,7 +90,8 @@ static int load_and_run(const sim_options_t *options, const taper_station_config
     FILE *problems = NULL;
     int code = SIM_EXIT_INPUT;
     if (sim_sessions_load(&sessions, options->sessions_file, station->connector_count) &&
-        load_limits(&limits, options, station->groups[0].limit_W / 1000.0) &&
+        sim_limits_choose(&limits, options->limit_file, options->limit_kw,
+                          station->groups[0].limit_W / 1000.0) &&
         (options->out == NULL || sim_output_check(options->out)) && open_problems(options, &problems)) {
         note_missing_planner(options);
         const sim_case_t run = {.station = station,

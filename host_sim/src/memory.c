@@ -1,19 +1,22 @@
+#define _GNU_SOURCE // program_invocation_short_name
+
 #include "memory.h"
 
+#include <errno.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-static _Noreturn void out_of_memory(void) {
-    fputs("taper-sim: out of memory\n", stderr);
+_Noreturn void sim_out_of_memory(void) {
+    fprintf(stderr, "%s: out of memory\n", program_invocation_short_name);
     exit(EXIT_FAILURE);
 }
 
 void *sim_allocate(size_t count, size_t size) {
     void *memory = calloc(count == 0 ? 1 : count, size);
     if (memory == NULL) {
-        out_of_memory();
+        sim_out_of_memory();
     }
     return memory;
 }
@@ -25,11 +28,11 @@ void *sim_grow(void *array, size_t *room, size_t needed, size_t size) {
     size_t wanted = *room < 32 ? 64 : *room * 2;
     wanted = wanted < needed ? needed : wanted;
     if (wanted > SIZE_MAX / 2 / size) {
-        out_of_memory();
+        sim_out_of_memory();
     }
     void *memory = realloc(array, wanted * size);
     if (memory == NULL) {
-        out_of_memory();
+        sim_out_of_memory();
     }
     *room = wanted;
     return memory;

@@ -4,6 +4,9 @@
 
 #include <stddef.h>
 
+/** Say so, and end. */
+_Noreturn void sim_out_of_memory(void);
+
 /** `count` zeroed elements of `size` bytes; never NULL. Free with free(). */
 void *sim_allocate(size_t count, size_t size);
 

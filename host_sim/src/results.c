@@ -26,8 +26,7 @@ typedef struct {
 static void open_text(sim_text_t *text) {
     text->stream = open_memstream(&text->text, &text->size);
     if (text->stream == NULL) {
-        fputs("taper-sim: out of memory\n", stderr);
-        exit(EXIT_FAILURE);
+        sim_out_of_memory();
     }
 }
 
@@ -206,7 +205,7 @@ bool sim_results_write(sim_results_t *results, const char *directory) {
                                       {"summary.json", summary, strlen(summary)}};
         written = sim_output_write(directory, files, sizeof files / sizeof files[0]);
     } else {
-        fputs("taper-sim: out of memory\n", stderr);
+        sim_out_of_memory();
     }
     cJSON_free(summary);
     free_text(&sessions);

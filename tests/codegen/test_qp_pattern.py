@@ -1,5 +1,6 @@
 """The matrices' structure, which the firmware fills in by position: a small station, written out by hand."""
 
+from dataclasses import replace
 from math import sqrt
 
 import numpy as np
@@ -19,7 +20,20 @@ def station() -> Station:
 
     groups = (Group("site", 10_000, None), Group("feeder", 5_000, 0))
     connectors = (connector(1, 1), connector(1, 2), connector(0, 3))
-    return Station("x", "", T, 900, 1000, 0, 0, 0, groups, connectors)
+    return Station(
+        name="x",
+        description="",
+        steps=T,
+        step_s=900,
+        tick_ms=1000,
+        min_on_ms=0,
+        min_off_ms=0,
+        failsafe_W=0,
+        other_load_W=0,
+        site_voltage_mV=230_000,
+        groups=groups,
+        connectors=connectors,
+    )
 
 
 def test_rows_stand_in_the_documented_order(station: Station) -> None:
@@ -66,5 +80,5 @@ def test_no_row_begins_as_an_equality(station: Station) -> None:
 
 
 def test_a_horizon_of_one_step_has_no_taper_rows(station: Station) -> None:
-    one = Station("x", "", 1, 900, 1000, 0, 0, 0, station.groups, station.connectors)
+    one = replace(station, steps=1)
     assert qp.constraint_matrix(one).shape == (3 + 0 + 3 + 2, 3)

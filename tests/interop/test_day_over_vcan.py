@@ -23,6 +23,7 @@ DAY_S = 86_400
 BUS_S = DAY_S / TIME_SCALE
 LIMIT_KW = "40"
 TIMEOUT_S = 3 * BUS_S
+START_S = 120.0  # of a Python program, in User-Mode Linux, on a busy machine
 SAME_STAMP_S = 2e-6
 COLUMNS = ("session_id", "connector", "arrival_s", "departure_s", "battery_kwh", "soc_arrival", "soc_target", "max_kw",
            "taper_kw")
@@ -67,6 +68,13 @@ class Programs:
             self.running[name] = subprocess.Popen([str(part) for part in command], cwd=self.folder, stdout=output,
                                                   stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL)
 
+    def wait_for_word(self, name, word):
+        give_up_s = time.monotonic() + START_S
+        while word not in self.said(name):
+            if time.monotonic() > give_up_s or self.running[name].poll() is not None:
+                pytest.fail(f"{name} did not say '{word}', but: {self.said(name)}")
+            time.sleep(0.05)
+
     def wait(self, name):
         """Exit code of a program that ends by itself, with what it said."""
         try:
@@ -108,10 +116,11 @@ def days(tmp_path_factory):
         time.sleep(0.5)
         own = [visit for visit in VISITS if visit[1] < FIRST_OF_TAPER_EV]
         others = [visit for visit in VISITS if visit[1] >= FIRST_OF_TAPER_EV]
-        start_vehicles(mixed, "vcan0", "4-8", write_sessions(mixed.folder / "others.csv", others), mixed.folder / "out")
         mixed.start("independent", sys.executable, HERE / "independent.py", "--can", "vcan0", "--nodes", "1,2,3",
                     "--seconds", BUS_S, "--time-scale", TIME_SCALE, "--report", mixed.folder / "report.json",
                     "--vehicles", write_sessions(mixed.folder / "own.csv", own))
+        mixed.wait_for_word("independent", "on vcan0")  # so that both halves of the day begin together
+        start_vehicles(mixed, "vcan0", "4-8", write_sessions(mixed.folder / "others.csv", others), mixed.folder / "out")
         start_station(mixed, "vcan0")
         start_vehicles(alone, interface("vcan1"), "1-8", write_sessions(alone.folder / "all.csv", VISITS),
                        alone.folder / "out")

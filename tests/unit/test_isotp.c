@@ -40,6 +40,12 @@ static void test_init_refuses_options_out_of_range(void) {
     taper_isotp_t other;
     taper_isotp_options_t options = bench_options(NULL, 0);
     TEST_ASSERT_EQUAL(TAPER_OK, taper_isotp_init(&other, &options));
+    options.send_id = 0x7FF;
+    options.receive_id = 0;
+    TEST_ASSERT_EQUAL(TAPER_OK, taper_isotp_init(&other, &options));
+    options.send_id = 0;
+    options.receive_id = 0x7FF;
+    TEST_ASSERT_EQUAL(TAPER_OK, taper_isotp_init(&other, &options));
     options = bench_options(NULL, 1);
     TEST_ASSERT_EQUAL(TAPER_ERR_ARGUMENT, taper_isotp_init(&other, &options));
     options = bench_options(buffer, 4096);
@@ -123,6 +129,18 @@ static void test_a_frame_that_never_leaves_ends_in_a_timeout(void) {
     taper_frame_t frame;
     TEST_ASSERT_TRUE(taper_isotp_next(&link, BENCH_TIMEOUT_ms, &frame));
     bench_gives_nothing(&link, BENCH_TIMEOUT_ms + 1);
+    assert_sending(TAPER_ISOTP_TIMEOUT);
+}
+
+static void test_the_timeout_of_a_frame_begins_after_its_gap(void) {
+    uint8_t data[20] = {0};
+    send(data, 20, 0);
+    bench_gives(&link, "10 14 00 00 00 00 00 00", 0);
+    bench_take(&link, "30 00 7F", 1);
+    bench_gives(&link, "21 00 00 00 00 00 00 00", 1);
+    taper_frame_t frame;
+    TEST_ASSERT_TRUE(taper_isotp_next(&link, 1 + 128 + BENCH_TIMEOUT_ms, &frame));
+    bench_gives_nothing(&link, 1 + 128 + BENCH_TIMEOUT_ms + 1);
     assert_sending(TAPER_ISOTP_TIMEOUT);
 }
 
@@ -301,6 +319,7 @@ int main(void) {
     RUN_TEST(test_messages_of_no_bytes_or_too_many_are_not_sent);
     RUN_TEST(test_a_frame_is_given_until_it_is_out);
     RUN_TEST(test_a_frame_that_never_leaves_ends_in_a_timeout);
+    RUN_TEST(test_the_timeout_of_a_frame_begins_after_its_gap);
     RUN_TEST(test_a_block_ends_in_another_wait_for_flow_control);
     RUN_TEST(test_the_separation_is_kept_and_one_millisecond_that_the_clock_may_hide);
     RUN_TEST(test_reserved_separations_count_as_the_longest);

@@ -77,6 +77,27 @@ static void test_lengths_come_through_with_several_separations(void) {
     }
 }
 
+static void test_without_blocks_one_flow_control_is_enough_for_the_longest_message(void) {
+    unsigned flow_controls = 0;
+    taper_frame_t frame;
+    open_with(0, 0);
+    bench_fill(message, LONGEST, 1);
+    TEST_ASSERT_EQUAL(TAPER_OK, taper_isotp_send(&a, message, LONGEST, 0));
+    while (taper_isotp_sending(&a) == TAPER_ISOTP_BUSY) {
+        if (taper_isotp_next(&a, 0, &frame)) {
+            taper_isotp_sent(&a, 0);
+            TEST_ASSERT_TRUE(taper_isotp_take(&b, &frame, 0));
+        }
+        if (taper_isotp_next(&b, 0, &frame)) {
+            taper_isotp_sent(&b, 0);
+            TEST_ASSERT_TRUE(taper_isotp_take(&a, &frame, 0));
+            flow_controls++;
+        }
+    }
+    bench_holds(&b, message, LONGEST);
+    TEST_ASSERT_EQUAL_UINT(1, flow_controls);
+}
+
 static void test_both_directions_go_at_once(void) {
     for (uint16_t length = 8; length <= LONGEST; length = (uint16_t)(length + 73)) {
         const uint16_t other = (uint16_t)(LONGEST + 8u - length);
@@ -318,6 +339,7 @@ int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_every_length_comes_through_with_several_block_sizes);
     RUN_TEST(test_lengths_come_through_with_several_separations);
+    RUN_TEST(test_without_blocks_one_flow_control_is_enough_for_the_longest_message);
     RUN_TEST(test_both_directions_go_at_once);
     RUN_TEST(test_a_send_queue_that_is_often_full_costs_only_time);
     RUN_TEST(test_the_loss_of_any_frame_gives_no_wrong_message_and_the_next_comes_through);

@@ -260,17 +260,19 @@ static void test_a_message_waits_until_the_buffer_is_released(void) {
 static void test_a_single_frame_waits_too_and_the_newest_is_kept(void) {
     bench_take(&link, "01 55", 0);
     bench_take(&link, FF, 0);
-    bench_take(&link, "02 01 02", 0);
+    bench_take(&link, "07 01 02 03 04 05 06 07", 0);
     bench_gives_nothing(&link, 0);
     bench_gives_nothing(&link, BENCH_TIMEOUT_ms);
     taper_isotp_release(&link, 0);
-    bench_holds(&link, TEN, 2);
+    bench_holds(&link, TEN, 7);
     taper_isotp_release(&link, 0);
     assert_received(TAPER_ISOTP_IDLE);
 }
 
 static void test_a_message_that_is_too_long_does_not_wait(void) {
     bench_take(&link, "01 55", 0);
+    bench_take(&link, "10 14 01 02 03 04 05 06", 0); /* fits just so */
+    bench_gives(&link, WAIT, 0);
     bench_take(&link, "10 15 01 02 03 04 05 06", 0);
     bench_gives(&link, OVERFLOW, 0);
     taper_isotp_release(&link, 0);

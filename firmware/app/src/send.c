@@ -10,7 +10,8 @@
 /** PLAN goes round all connectors in this many seconds. */
 #define PLAN_ROUND_s 8u
 
-_Static_assert(VALIDITY_FLOOR_ms > 4u * TAPER_SETPOINT_CYCLE_ms, "a setpoint outlives the loss of some frames");
+_Static_assert(VALIDITY_FLOOR_ms > 4u * TAPER_SETPOINT_CYCLE_ms,
+               "a setpoint outlives the loss of some frames");
 
 uint32_t taper_station_validity_ms(const taper_station_options_t *options) {
     const uint32_t tick_ms = options->config->tick_ms / options->time_scale;
@@ -108,7 +109,8 @@ static void send_plan(taper_station_t *station, uint8_t i, uint32_t now_ms) {
     const taper_connector_config_t *connector = &station->options.config->connectors[i];
     const taper_demand_t *demand = &station->snapshot.demand[i];
     taper_message_t message = {.kind = TAPER_MESSAGE_PLAN, .bus = connector->bus, .node = connector->node};
-    const bool planned = taper_station_has_plan(station) && demand->active && station->plan_session[i] == demand->session;
+    const bool planned =
+        taper_station_has_plan(station) && demand->active && station->plan_session[i] == demand->session;
     message.as.plan.reason = (uint8_t)taper_station_reason(station, i);
     for (uint8_t t = 0; t < TAPER_PLAN_STEPS; t++) {
         message.as.plan.power_W[t] = planned ? station->plan_W[t][i] : TAPER_ABSENT;

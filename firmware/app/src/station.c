@@ -88,8 +88,8 @@ static void allocate(taper_station_t *station, int32_t site_limit_W, uint32_t no
         reserved_mA[i] = online ? 0 : taper_ledger_may_mA(&station->ledger, i);
         station->setpoint_session[i] = taper_session_number(&station->sessions, i);
     }
-    taper_allocate(&station->allocator, config, &station->snapshot, &station->proposal, site_limit_W, reserved_mA,
-                   &station->target);
+    taper_allocate(&station->allocator, config, &station->snapshot, &station->proposal, site_limit_W,
+                   reserved_mA, &station->target);
     if (station->rival_heard || station->stopped) {
         memset(&station->target, 0, sizeof station->target);
     }
@@ -99,8 +99,8 @@ static void allocate(taper_station_t *station, int32_t site_limit_W, uint32_t no
 static void grant(taper_station_t *station, taper_setpoints_t *granted) {
     const taper_station_config_t *config = station->options.config;
     const int32_t site_W = station->limit_now.site_W;
-    taper_ledger_grant(&station->ledger, config, &station->snapshot, station->proposal.rank, site_W, &station->target,
-                       granted);
+    taper_ledger_grant(&station->ledger, config, &station->snapshot, station->proposal.rank, site_W,
+                       &station->target, granted);
     if (!taper_guard_passes(config, &station->snapshot, site_W, granted) ||
         !taper_guard_hand_over_passes(&station->ledger, config, &station->snapshot, site_W, granted)) {
         taper_station_count(station, TAPER_COUNTER_GUARD_VIOLATIONS);
@@ -145,7 +145,8 @@ static void begin(taper_station_t *station, uint32_t now_ms) {
     if (!station->started) {
         station->started = true;
         taper_ledger_init(&station->ledger, config, taper_station_validity_ms(&station->options), now_ms);
-        taper_event_note(&station->events, TAPER_EVENT_STARTED, 0, 0, taper_saturate_i32(station->record.starts));
+        taper_event_note(&station->events, TAPER_EVENT_STARTED, 0, 0,
+                         taper_saturate_i32(station->record.starts));
     }
     taper_station_receive(station, now_ms);
     taper_ledger_update(&station->ledger, config, now_ms);

@@ -1,5 +1,6 @@
 #include "transfer_wire.h"
 
+#include <stddef.h>
 #include <string.h>
 
 #include "taper/limits.h"
@@ -96,13 +97,13 @@ uint16_t taper_transfer_write_log(uint8_t *message, const taper_event_log_t *eve
     const uint32_t count = events->count < TAPER_EVENTS ? events->count : TAPER_EVENTS;
     for (uint32_t k = 0; k < count; k++) {
         const uint32_t at = (events->count - count + k) % TAPER_EVENTS;
-        put_event(message + HEADER_BYTES + k * TAPER_LOG_ITEM, &events->event[at]);
+        put_event(message + HEADER_BYTES + (size_t)k * TAPER_LOG_ITEM, &events->event[at]);
     }
     return seal(message, TAPER_TRANSFER_LOG, (uint16_t)count, (uint16_t)(count * TAPER_LOG_ITEM));
 }
 
 static uint32_t point_unix_s(const taper_transfer_t *transfer, uint16_t k) {
-    return get_u32(transfer->items + k * TAPER_CURVE_ITEM);
+    return get_u32(transfer->items + (size_t)k * TAPER_CURVE_ITEM);
 }
 
 /** Whether times ascend and none is too far ahead. */
@@ -136,7 +137,7 @@ taper_transfer_answer_t taper_transfer_read_curve(const taper_transfer_t *transf
         }
         curve->point[curve->count] = (taper_limit_point_t){
             .time_ms = ahead ? world_ms + (at_s - scene->unix_s) * 1000u : world_ms,
-            .limit_W = get_u16(transfer->items + k * TAPER_CURVE_ITEM + 4) * CURVE_STEP_W,
+            .limit_W = get_u16(transfer->items + (size_t)k * TAPER_CURVE_ITEM + 4) * CURVE_STEP_W,
         };
         curve->count++;
     }

@@ -291,9 +291,7 @@ static void data_is_out(taper_isotp_t *link, uint32_t now_ms) {
     }
     link->out.sequence = (link->out.sequence + 1u) & LOW_NIBBLE;
     link->out.gap_ms = link->out.separation_ms;
-    if (!first && !link->out.unlimited_block) {
-        link->out.left_in_block--;
-    }
+    link->out.left_in_block--; /* before the first flow control, and without blocks, nobody looks at it */
     if (first || (!link->out.unlimited_block && link->out.left_in_block == 0)) {
         wait_for_flow(link);
     }

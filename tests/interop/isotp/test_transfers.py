@@ -43,7 +43,7 @@ def test_a_limit_curve_arrives_point_by_point(count: int) -> None:
 
 
 def test_the_example_of_the_document_works(capsys: pytest.CaptureFixture[str]) -> None:
-    text = (Path(__file__).parents[2] / "docs" / "transfers.md").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[3] / "docs" / "transfers.md").read_text(encoding="utf-8")
     (example,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
     assert example.count('"can0"') == 1
     with running("transfers") as peer:
