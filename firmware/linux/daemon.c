@@ -89,10 +89,23 @@ static bool fail(const char *what, const char *reason) {
     return false;
 }
 
+#define FUNCTION(name)   {TAPER_MESSAGE_##name << 6, 0x7C0}
+#define GATEWAY_ID(name) {TAPER_MESSAGE_##name << 6 | TAPER_NODE_GATEWAY, 0x7FF}
+
+/** What the station listens to. SETPOINT and CTRL_STATUS are its own to send: heard, they come from a second controller. */
+static const taper_socketcan_filter_t filters[] = {
+    FUNCTION(EMCY),        GATEWAY_ID(SITE_LIMIT), FUNCTION(SETPOINT),     FUNCTION(EVSE_STATUS),
+    FUNCTION(EV_STATUS),   FUNCTION(EVSE_ELEC),    GATEWAY_ID(SITE_METER), GATEWAY_ID(TIME_SYNC),
+    FUNCTION(CTRL_STATUS), FUNCTION(EV_PARAM_A),   FUNCTION(EV_PARAM_B),   FUNCTION(EV_PARAM_C),
+    FUNCTION(EV_PARAM_D),  FUNCTION(EVSE_INFO),    FUNCTION(ISOTP_FROM),
+};
+
 static bool open_can(daemon_t *daemon, const taper_options_t *options) {
     char reason[256] = "";
     const taper_socketcan_options_t can = {.interfaces = options->interfaces,
                                            .count = options->interface_count,
+                                           .filters = filters,
+                                           .filter_count = sizeof filters / sizeof filters[0],
                                            .now_ms = station_ms,
                                            .clock_context = daemon};
     if (!taper_socketcan_open(&daemon->can, &can, reason, sizeof reason)) {

@@ -178,12 +178,15 @@ static void set_curve(taper_station_t *station) {
                            status == TAPER_OK ? TAPER_ANSWER_ACCEPTED : TAPER_ANSWER_CONTENT,
                            station->events.now_ms);
     if (status == TAPER_OK) {
-        taper_station_count(station, TAPER_COUNTER_TRANSFERS);
         taper_event_note(&station->events, TAPER_EVENT_CURVE_SET, 0, TAPER_NODE_GATEWAY,
                          station->incoming_curve.count);
-    } else {
-        taper_station_count(station, TAPER_COUNTER_TRANSFERS_REFUSED);
     }
+}
+
+static void note_identifier(taper_station_t *station, const taper_frame_t *frame, uint8_t connector) {
+    const size_t length = strlen(taper_transfers_identifier(&station->transfers, connector));
+    taper_event_note(&station->events, TAPER_EVENT_IDENTIFIED, frame->bus, (uint8_t)(frame->id & 0x3Fu),
+                     (int32_t)length);
 }
 
 static void take_transfer(taper_station_t *station, const taper_frame_t *frame) {
@@ -196,12 +199,8 @@ static void take_transfer(taper_station_t *station, const taper_frame_t *frame) 
     uint8_t connector = 0;
     switch (taper_transfers_take(&station->transfers, frame, &scene, &station->incoming_curve, &connector)) {
     case TAPER_RESULT_CURVE: set_curve(station); break;
-    case TAPER_RESULT_IDENTIFIER: taper_station_count(station, TAPER_COUNTER_TRANSFERS); break;
-    case TAPER_RESULT_REFUSED:
-        taper_station_count(station, TAPER_COUNTER_TRANSFERS_REFUSED);
-        taper_event_note(&station->events, TAPER_EVENT_TRANSFER_REFUSED, frame->bus,
-                         (uint8_t)(frame->id & 0x3Fu), 0);
-        break;
+    case TAPER_RESULT_IDENTIFIER: note_identifier(station, frame, connector); break;
+    case TAPER_RESULT_REFUSED: /* counted there, and noted with those that ran out of time */
     case TAPER_RESULT_NONE:
     default: break;
     }

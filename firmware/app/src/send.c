@@ -7,6 +7,8 @@
 #define VALIDITY_TICKS    3u
 /** Longest that SETPOINT can say. */
 #define VALIDITY_MOST_ms 127000u
+/** Setpoints wait behind frames of transfers: a peer that asks for no gap gets no more than this at a time. */
+#define TRANSFER_FRAMES 8u
 /** PLAN goes round all connectors in this many seconds. */
 #define PLAN_ROUND_s 8u
 
@@ -155,10 +157,23 @@ void taper_station_send_display(taper_station_t *station, uint32_t now_ms) {
     send_diag(station, now_ms);
 }
 
+static void note_transfers(taper_station_t *station) {
+    uint32_t *count = station->counters.count;
+    if (station->transfers.refused != count[TAPER_COUNTER_TRANSFERS_REFUSED]) {
+        taper_event_note(&station->events, TAPER_EVENT_TRANSFER_REFUSED, 0, 0,
+                         taper_saturate_i32(station->transfers.refused));
+    }
+    count[TAPER_COUNTER_TRANSFERS] = station->transfers.accepted;
+    count[TAPER_COUNTER_TRANSFERS_REFUSED] = station->transfers.refused;
+}
+
 void taper_station_send_transfers(taper_station_t *station, uint32_t now_ms) {
     taper_frame_t frame;
-    while (taper_transfers_next(&station->transfers, now_ms, &frame) &&
-           taper_bus_guard_send(station, &frame, now_ms)) {
-        taper_transfers_sent(&station->transfers, &frame, now_ms);
+    for (unsigned k = 0; k < TRANSFER_FRAMES && taper_transfers_next(&station->transfers, now_ms, &frame);
+         k++) {
+        if (taper_bus_guard_send(station, &frame, now_ms)) {
+            taper_transfers_sent(&station->transfers, &frame, now_ms);
+        }
     }
+    note_transfers(station);
 }

@@ -154,6 +154,15 @@ static void copy_counters(taper_station_t *station) {
     count[TAPER_COUNTER_PARAMETERS_REPAIRED] = station->sessions.repaired;
 }
 
+/** Who leaves takes his name along. */
+static void forget_identifiers(taper_station_t *station) {
+    for (uint8_t i = 0; i < station->options.config->connector_count; i++) {
+        if (!station->sessions.session[i].vehicle_there) {
+            taper_transfers_forget(&station->transfers, i);
+        }
+    }
+}
+
 static void decide(taper_station_t *station, uint32_t now_ms) {
     taper_session_snapshot(&station->sessions, now_ms, &station->snapshot);
     station->limit_now = taper_limits_now(&station->limits, now_ms);
@@ -172,6 +181,7 @@ void taper_station_step(taper_station_t *station, uint32_t now_ms) {
     begin(station, now_ms);
     taper_session_update(&station->sessions, now_ms);
     taper_limits_update(&station->limits, now_ms);
+    forget_identifiers(station);
     decide(station, now_ms);
     taper_station_send_setpoints(station, now_ms);
     copy_counters(station);
