@@ -7,6 +7,7 @@ plays all, and taper-sim in memory says what must come out.
 import csv
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -42,6 +43,11 @@ def program(variable):
     if not os.access(path, os.X_OK):
         pytest.fail(f"{variable} must be the path of a program that was built, not '{path}'; ctest sets it")
     return path
+
+
+def candump():
+    path = shutil.which("candump")
+    return path or pytest.fail("candump is missing: sudo apt-get install can-utils")
 
 
 def interface(name):
@@ -112,7 +118,7 @@ def days(tmp_path_factory):
     """Both days, at the same time: their folders and programs, which have been started."""
     mixed, alone = (Programs(tmp_path_factory.mktemp(name)) for name in ("mixed", "alone"))
     try:
-        mixed.start("candump", "candump", "-l", interface("vcan0"))
+        mixed.start("candump", candump(), "-l", interface("vcan0"))
         time.sleep(0.5)
         own = [visit for visit in VISITS if visit[1] < FIRST_OF_TAPER_EV]
         others = [visit for visit in VISITS if visit[1] >= FIRST_OF_TAPER_EV]

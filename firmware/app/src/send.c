@@ -64,17 +64,29 @@ static void send_setpoint(taper_station_t *station, uint8_t i, uint32_t now_ms) 
     }
     if (taper_station_send_message(station, &message, &station->setpoint_counter[i], now_ms)) {
         taper_ledger_sent(&station->ledger, i, counter, station->setpoints.current_mA[i], now_ms);
-        station->setpoint_due[i] = false;
-        station->setpoint_ms[i] = now_ms;
+        station->sent_mA[i] = station->setpoints.current_mA[i];
+        station->sent_session[i] = station->setpoint_session[i];
+        station->sent_ms[i] = now_ms;
     }
+}
+
+static bool is_due(const taper_station_t *station, uint8_t i, uint32_t now_ms) {
+    return station->setpoints.current_mA[i] != station->sent_mA[i] ||
+           station->setpoint_session[i] != station->sent_session[i] ||
+           taper_elapsed_ms(now_ms, station->sent_ms[i]) >= TAPER_SETPOINT_CYCLE_ms;
 }
 
 void taper_station_send_setpoints(taper_station_t *station, uint32_t now_ms) {
     for (uint8_t i = 0; i < station->options.config->connector_count; i++) {
-        const bool stale = taper_elapsed_ms(now_ms, station->setpoint_ms[i]) >= TAPER_SETPOINT_CYCLE_ms;
-        if (station->setpoint_due[i] || stale) {
+        if (is_due(station, i, now_ms)) {
             send_setpoint(station, i, now_ms);
         }
+    }
+}
+
+void taper_station_forget_sent(taper_station_t *station) {
+    for (uint8_t i = 0; i < station->options.config->connector_count; i++) {
+        station->sent_mA[i] = -1;
     }
 }
 

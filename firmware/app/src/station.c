@@ -39,6 +39,7 @@ taper_status_t taper_station_init(taper_station_t *station, const taper_station_
     station->options = *options;
     station->options.time_scale = options->time_scale == 0 ? 1 : options->time_scale;
     init_layers(station);
+    taper_station_forget_sent(station);
     taper_record_load(station);
     if (options->solver != NULL) {
         return taper_planner_init(&station->planner, options->solver, options->config);
@@ -113,18 +114,10 @@ bool taper_station_hands_over(const taper_station_t *station) {
     return memcmp(&station->target, &station->setpoints, sizeof station->target) != 0;
 }
 
-/** Grant again, between ticks: what changed is due. */
+/** Grant again, between ticks. */
 static void regrant(taper_station_t *station) {
-    taper_setpoints_t granted;
-    if (!taper_station_hands_over(station)) {
-        return;
-    }
-    grant(station, &granted);
-    for (uint8_t i = 0; i < station->options.config->connector_count; i++) {
-        if (granted.current_mA[i] != station->setpoints.current_mA[i]) {
-            station->setpoints.current_mA[i] = granted.current_mA[i];
-            station->setpoint_due[i] = true;
-        }
+    if (taper_station_hands_over(station)) {
+        grant(station, &station->setpoints);
     }
 }
 
@@ -180,7 +173,6 @@ void taper_station_step(taper_station_t *station, uint32_t now_ms) {
     taper_session_update(&station->sessions, now_ms);
     taper_limits_update(&station->limits, now_ms);
     decide(station, now_ms);
-    memset(station->setpoint_due, 1, sizeof station->setpoint_due);
     taper_station_send_setpoints(station, now_ms);
     copy_counters(station);
     taper_station_send_display(station, now_ms);
@@ -209,7 +201,7 @@ void taper_station_stop(taper_station_t *station, uint32_t now_ms) {
     station->events.now_ms = now_ms;
     memset(&station->target, 0, sizeof station->target); /* the fallback current of every connector is 0 */
     memset(&station->setpoints, 0, sizeof station->setpoints);
-    memset(station->setpoint_due, 1, sizeof station->setpoint_due);
+    taper_station_forget_sent(station);
     taper_station_send_setpoints(station, now_ms);
 }
 

@@ -133,8 +133,9 @@ typedef struct {
     uint8_t setpoint_counter[TAPER_MAX_CONNECTORS];
     uint8_t plan_counter[TAPER_MAX_CONNECTORS];
     uint8_t setpoint_session[TAPER_MAX_CONNECTORS]; /**< whom the setpoints were decided for */
-    bool setpoint_due[TAPER_MAX_CONNECTORS];        /**< decided, but not sent yet */
-    uint32_t setpoint_ms[TAPER_MAX_CONNECTORS];     /**< when one was last sent */
+    int32_t sent_mA[TAPER_MAX_CONNECTORS];          /**< what was last sent; negative: nothing that counts */
+    uint8_t sent_session[TAPER_MAX_CONNECTORS];     /**< and for whom */
+    uint32_t sent_ms[TAPER_MAX_CONNECTORS];         /**< and when */
     uint8_t status_counter[TAPER_MAX_BUSES];
     uint8_t diag_counter[TAPER_MAX_BUSES];
     uint8_t emcy_counter[TAPER_MAX_BUSES];
