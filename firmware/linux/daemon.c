@@ -17,7 +17,8 @@
 
 typedef struct {
     const taper_options_t *options;
-    uint64_t start_us; /**< CLOCK_MONOTONIC at station time 0 */
+    uint64_t start_us;      /**< CLOCK_MONOTONIC at station time 0 */
+    uint64_t start_wall_us; /**< wall clock then */
     uint32_t tick_ms;
     uint64_t missed_ticks;
     taper_socketcan_t can;
@@ -117,7 +118,7 @@ static bool open_can(daemon_t *daemon, const taper_options_t *options) {
 
 static bool open_record(daemon_t *daemon, const taper_options_t *options) {
     // Whole milliseconds: so are all times in the recording.
-    const uint64_t start_us = taper_log_wall_us() / 1000 * 1000;
+    const uint64_t start_us = daemon->start_wall_us / 1000 * 1000;
     if (options->record != NULL &&
         !taper_record_open(&daemon->record, options->record, options->interfaces, start_us)) {
         char reason[512];
@@ -234,11 +235,16 @@ int taper_daemon_run(const taper_options_t *options, taper_made_t *made) {
     taper_log_open(options->log_level);
     set_signals(daemon);
     taper_notify_open(&daemon->notify);
+    // The station first: it takes its time, and station time 0 should be now.
+    if (!open_station(daemon, options, made)) {
+        return TAPER_EXIT_FAILURE;
+    }
     daemon->start_us = taper_board_steady_us();
+    daemon->start_wall_us = taper_log_wall_us();
     if (!open_can(daemon, options)) {
         return TAPER_EXIT_FAILURE;
     }
-    if (!open_record(daemon, options) || !open_station(daemon, options, made)) {
+    if (!open_record(daemon, options)) {
         taper_socketcan_close(&daemon->can);
         return TAPER_EXIT_FAILURE;
     }

@@ -1,6 +1,5 @@
 #include "events.h"
 
-#include <ctype.h>
 #include <inttypes.h>
 #include <stdio.h>
 
@@ -64,7 +63,8 @@ static void print_name(char *text, size_t size, const taper_event_kind_t *kind, 
     }
     size_t i = 0;
     for (; kind->name[i] != '\0' && i + 1 < size; i++) {
-        text[i] = (char)tolower((unsigned char)kind->name[i]);
+        const char c = kind->name[i];
+        text[i] = (char)(c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c);
     }
     text[i] = '\0';
 }
