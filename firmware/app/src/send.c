@@ -115,7 +115,9 @@ void taper_station_send_status(taper_station_t *station, uint32_t now_ms) {
     message.as.ctrl_status = status_of(station);
     const uint8_t buses = taper_station_buses(station->options.config);
     for (message.bus = 0; message.bus < buses; message.bus++) {
-        (void)taper_station_send_message(station, &message, &station->status_counter[message.bus], now_ms);
+        const bool due = station->status_due[message.bus];
+        station->status_due[message.bus] =
+            due && !taper_station_send_message(station, &message, &station->status_counter[message.bus], now_ms);
     }
 }
 

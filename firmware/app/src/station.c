@@ -188,6 +188,7 @@ void taper_station_step(taper_station_t *station, uint32_t now_ms) {
     taper_station_send_display(station, now_ms);
     taper_alarm_update(station, now_ms);
     taper_station_send_transfers(station, now_ms);
+    memset(station->status_due, 1, sizeof station->status_due);
     taper_station_send_status(station, now_ms);
     taper_record_update(station, now_ms);
     if (port->kick_watchdog != NULL) {
@@ -201,14 +202,15 @@ void taper_station_poll(taper_station_t *station, uint32_t now_ms) {
     taper_station_send_setpoints(station, now_ms);
     taper_alarm_update(station, now_ms);
     taper_station_send_transfers(station, now_ms);
+    taper_station_send_status(station, now_ms);
 }
 
 void taper_station_stop(taper_station_t *station, uint32_t now_ms) {
+    station->events.now_ms = now_ms;
     if (!station->stopped) {
         taper_event_note(&station->events, TAPER_EVENT_STOPPED, 0, 0, 0);
     }
     station->stopped = true;
-    station->events.now_ms = now_ms;
     memset(&station->target, 0, sizeof station->target); /* the fallback current of every connector is 0 */
     memset(&station->setpoints, 0, sizeof station->setpoints);
     taper_station_forget_sent(station);

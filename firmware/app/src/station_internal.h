@@ -52,7 +52,7 @@ void taper_station_send_setpoints(taper_station_t *station, uint32_t now_ms);
 /** Have all of them sent, whatever was sent before. */
 void taper_station_forget_sent(taper_station_t *station);
 
-/** CTRL_STATUS on every bus. */
+/** CTRL_STATUS on every bus where it is due: one that was refused is tried again. */
 void taper_station_send_status(taper_station_t *station, uint32_t now_ms);
 
 /** Once a second: PLAN of some connectors, and one counter. */

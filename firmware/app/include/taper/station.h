@@ -136,6 +136,7 @@ typedef struct {
     int32_t sent_mA[TAPER_MAX_CONNECTORS];          /**< what was last sent; negative: nothing that counts */
     uint8_t sent_session[TAPER_MAX_CONNECTORS];     /**< and for whom */
     uint32_t sent_ms[TAPER_MAX_CONNECTORS];         /**< and when */
+    bool status_due[TAPER_MAX_BUSES]; /**< the CTRL_STATUS of this tick is not out yet */
     uint8_t status_counter[TAPER_MAX_BUSES];
     uint8_t diag_counter[TAPER_MAX_BUSES];
     uint8_t emcy_counter[TAPER_MAX_BUSES];
