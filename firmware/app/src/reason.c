@@ -65,8 +65,9 @@ taper_reason_t taper_station_reason(const taper_station_t *station, uint8_t conn
     if (idle != TAPER_REASON_PLANNED) {
         return idle;
     }
-    const bool nobody =
-        station->stopped || station->rival_heard || station->supervisor.mode == TAPER_MODE_INIT;
+    const bool nobody = station->stopped || station->rival_heard ||
+                        station->supervisor.mode == TAPER_MODE_INIT ||
+                        station->bus[station->options.config->connectors[connector].bus].silent;
     if (nobody || !station->snapshot.demand[connector].active) {
         return TAPER_REASON_STATION;
     }

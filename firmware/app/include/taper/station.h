@@ -29,8 +29,6 @@
 #include "taper/transfers.h"
 #include "taper/types.h"
 
-/** Periodic protected frames of a connector with a vehicle: EVSE_STATUS, EV_STATUS, EVSE_ELEC, EV_PARAM_A..D. */
-#define TAPER_FRAMES_PER_CONNECTOR 7
 /** All protected frames that a connector, or the gateway, can send: the number of end-to-end receivers. */
 #define TAPER_CONNECTOR_RECEIVERS 9
 #define TAPER_GATEWAY_RECEIVERS   4
@@ -81,8 +79,9 @@ typedef struct {
 
 /** One CAN bus of the station, as a sender sees it. */
 typedef struct {
-    bool silent;   /**< nothing is sent until `retry_ms` */
-    bool refusing; /**< since `refusing_since_ms` nothing was taken */
+    bool silent;     /**< nothing is sent until `retry_ms` */
+    bool in_trouble; /**< nothing was taken since it was first left alone */
+    bool refusing;   /**< since `refusing_since_ms` nothing was taken */
     uint32_t refusing_since_ms;
     uint32_t retry_ms;
     uint32_t back_ms;  /**< when it was last taken into use again */
@@ -136,7 +135,7 @@ typedef struct {
     int32_t sent_mA[TAPER_MAX_CONNECTORS];          /**< what was last sent; negative: nothing that counts */
     uint8_t sent_session[TAPER_MAX_CONNECTORS];     /**< and for whom */
     uint32_t sent_ms[TAPER_MAX_CONNECTORS];         /**< and when */
-    bool status_due[TAPER_MAX_BUSES]; /**< the CTRL_STATUS of this tick is not out yet */
+    bool status_due[TAPER_MAX_BUSES];               /**< the CTRL_STATUS of this tick is not out yet */
     uint8_t status_counter[TAPER_MAX_BUSES];
     uint8_t diag_counter[TAPER_MAX_BUSES];
     uint8_t emcy_counter[TAPER_MAX_BUSES];
