@@ -3,10 +3,10 @@
 
 Counts the frames, those lost, and, with --garbage-rate, whom a node disturbs that sends random bytes under one identifier.
 CPU time is told three ways. "Own work" is the recording of the run, replayed without a bus on this machine: the exact work
-of the firmware, and the reading of the log. "On the bus" is what all processes of this machine spend less when the station
-is not there; in User-Mode Linux that includes what emulating the system calls costs. "By /proc/PID/stat" is what the kernel
-beneath the interface says: User-Mode Linux counts by ticks of 10 ms, at which a program that wakes up with the clock is
-found always or never.
+of the firmware, and the reading of the log. "By /proc/PID/stat" is what the kernel beneath the interface says: User-Mode
+Linux counts by ticks of 10 ms, at which a program that wakes up with the clock is found always or never. "All programs" are
+those of this machine that make the bus and use it, with and without the station: the difference is the station with its
+system calls, its recording, and what the others do because of it; in User-Mode Linux a system call costs tens of us.
 """
 
 from __future__ import annotations
@@ -59,7 +59,8 @@ def mark(name: str) -> None:
 
 def run_inside(options: argparse.Namespace) -> None:
     """Everything that needs the interface. Results go to inside.json, marks to stdout."""
-    bus = FullBus(options.station_program, options.ev_program, options.inside,
+    garbage = {"strange_id": options.garbage_id} if options.garbage_rate > 0 else {}
+    bus = FullBus(options.station_program, options.ev_program, options.inside, **garbage,
                   options=("--record", str(options.inside / "record.log")))
     try:
         bus.wait_for("session_begun", CONNECTORS)
@@ -79,10 +80,9 @@ def run_inside(options: argparse.Namespace) -> None:
         mark("end")
     finally:
         bus.stop()
-    strange_id = options.garbage_id if options.garbage_rate > 0 else -1
-    heard = bus.heard(DBC, strange_id)
+    heard = bus.heard(DBC)
     result = {"stat_percent": stat_percent, "summary": summary, "events": bus.events(), "seconds": heard.seconds,
-              "to_station": heard.to_station, "from_station": heard.from_station, "broken": heard.broken.total()}
+              "frames": bus.frames, "broken": heard.broken.total()}
     (options.inside / "inside.json").write_text(json.dumps(result))
 
 
@@ -133,16 +133,17 @@ def report(options: argparse.Namespace, result: dict, together: dict[str, float]
     babbler = options.garbage_id & 63 if options.garbage_rate > 0 else 0
     disturbed = sorted({(event, node) for event, node in result["events"] if event in TROUBLE and node != babbler})
     own = sorted({event for event, node in result["events"] if babbler and node == babbler and event != "session_begun"})
-    missing = result["to_station"] - summary["frames_received"]
-    print(f"{result['seconds']:.0f} s; frames a second: {result['to_station'] / result['seconds']:.0f} to the station, "
-          f"{result['from_station'] / result['seconds']:.0f} from it")
-    print(f"frames to the station by candump {result['to_station']}, by the station {summary['frames_received']}; "
-          f"from it {result['from_station']}, {summary['frames_sent']}")
+    received, sent = summary["frames_received"], summary["frames_sent"]
+    missing = result["frames"] - received - sent
+    print(f"{result['seconds']:.0f} s; frames a second: {received / result['seconds']:.0f} to the station, "
+          f"{sent / result['seconds']:.0f} from it")
+    print(f"frames: on the interface {result['frames']}, taken by the station {received}, sent by it {sent}, "
+          f"missing {missing}")
     print(f"lost: by the station's check {summary['frames_lost']}, receive overflows {summary['receive_overflows']}, "
           f"refused to send {summary['send_refused']}, by the check of candump's record {result['broken']}")
-    print(f"station, share of one core: own work {replayed:.2f} %, on the bus {together['with'] - together['without']:.2f} % "
-          f"(all {together['with']:.1f} %, without the station {together['without']:.1f} %), "
-          f"by /proc/PID/stat {result['stat_percent']:.2f} %")
+    print(f"station, share of one core: own work {replayed:.2f} %, by /proc/PID/stat {result['stat_percent']:.2f} %")
+    if not babbler:
+        print(f"all programs {together['with']:.1f} %, without the station {together['without']:.1f} %")
     if babbler:
         print(f"node {babbler}, with garbage: {', '.join(own)}; frames dropped as babble {summary['frames_babbled']}")
     print(f"others disturbed: {disturbed or 'none'}")

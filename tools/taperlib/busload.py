@@ -1,4 +1,4 @@
-"""A full bus: the station with 60 connectors, its field at nominal rates, and a node that sends garbage, on a CAN interface."""
+"""A full bus: the station with 60 connectors, its field at nominal rates, and a node that sends garbage."""
 
 import random
 import re
@@ -18,8 +18,8 @@ CONNECTORS = 60
 PATIENCE_S = 30
 PAUSE_S = 0.5  # with nobody sending, the station has taken all within this
 BURST_S = 0.01
+CHARGE = 1  # command of SETPOINT
 COLUMNS = "session_id,connector,arrival_s,departure_s,battery_kwh,soc_arrival,soc_target,max_kw,taper_kw"
-FROM_STATION = ("SETPOINT", "CTRL_STATUS", "CTRL_DIAG", "PLAN")
 FRAME = struct.Struct("=IB3x8s")
 
 
@@ -48,22 +48,22 @@ def babble(interface: str, can_id: int, rate: float, seconds: float) -> int:
 @dataclass
 class Heard:
     """What candump's record tells of the bus while the station ran."""
-    to_station: int = 0
-    from_station: int = 0
     seconds: float = 0.0
     broken: Counter = field(default_factory=Counter)  # by identifier: frames that the end-to-end check misses or refuses
     current_dA: dict[int, list[tuple[float, int]]] = field(default_factory=dict)  # by node: (time, current told)
 
 
 class FullBus:
-    """Station, field and candump, running; stop() ends them one by one so that nothing is on its way."""
+    """Station, field and candump, running. What has the identifier `strange_id`, garbage, candump leaves out."""
 
     def __init__(self, station: Path, field_program: Path, folder: Path, *, interface: str = "vcan0", max_kw: float = 22.0,
-                 limit_kw: float = 400.0, options: tuple[str, ...] = ()):
+                 limit_kw: float = 400.0, strange_id: int = 0x7FF, options: tuple[str, ...] = ()):
         self.folder, self.interface = folder, interface
+        self.frames = 0  # that all sent while the station ran; known when it has stopped
         write_sessions(folder / "sessions.csv", max_kw)
-        self.candump = self._start("candump", "candump", "-L", "-r", "8000000", interface)
+        self.candump = self._start("candump", "candump", "-L", "-r", "8000000", f"{interface},{strange_id:X}~7FF")
         time.sleep(0.5)
+        self._frames_before = self._count_frames()
         self.station = self._start("station", station, "--can", interface, "--station", "depot", *options)
         self.field = self._start("field", field_program, "--can", interface, "--sessions", folder / "sessions.csv",
                                  "--limit-kw", limit_kw)
@@ -71,6 +71,9 @@ class FullBus:
     def _start(self, name: str, *command: object) -> subprocess.Popen:
         with (self.folder / f"{name}.log").open("w") as output:
             return subprocess.Popen([str(part) for part in command], stdout=output, stderr=subprocess.STDOUT)
+
+    def _count_frames(self) -> int:
+        return int(Path(f"/sys/class/net/{self.interface}/statistics/tx_packets").read_text())
 
     def events(self) -> list[tuple[str, int]]:
         """(event, node) of the station's log, 0 for those about no node."""
@@ -98,6 +101,7 @@ class FullBus:
         time.sleep(PAUSE_S)
         self.station.terminate()
         self.station.wait(PATIENCE_S)
+        self.frames = self._count_frames() - self._frames_before
         self.field.send_signal(signal.SIGCONT)
         summary = [line for line in (self.folder / "station.log").read_text().splitlines() if "event=summary" in line]
         return dict(re.findall(r"(\w+)=(\S+)", summary[-1]))
@@ -109,25 +113,19 @@ class FullBus:
                 process.send_signal(signal.SIGINT)
                 process.wait(PATIENCE_S)
 
-    def heard(self, dbc: Path, strange_id: int = -1) -> Heard:
-        """The bus up to the station's last frame. `strange_id` is that of the garbage: it is counted, but not checked."""
+    def heard(self, dbc: Path) -> Heard:
+        """The bus up to the station's last setpoint."""
         database = Database(dbc)
-        frames = list(read_log(self.folder / "candump.log", self.interface))
-        names = {can_id: database.name_of(can_id) for can_id in {frame.can_id for frame in frames}}
-        mine = {can_id for can_id, name in names.items() if name in FROM_STATION}
-        last = max(k for k, frame in enumerate(frames) if frame.can_id in mine)
         setpoint = database.function_of("SETPOINT")
+        frames = list(read_log(self.folder / "candump.log", self.interface))
+        last = max(k for k, frame in enumerate(frames) if frame.can_id >> 6 == setpoint)
         heard = Heard(seconds=frames[last].time_s - frames[0].time_s)
         receivers: dict[int, Receiver] = {}
         for frame in frames[:last + 1]:
-            if frame.can_id in mine:
-                heard.from_station += 1
-            else:
-                heard.to_station += 1
             if frame.can_id >> 6 == setpoint:
-                told = int.from_bytes(frame.data[2:4], "little") if frame.data[1] >> 4 == 1 else 0
+                told = int.from_bytes(frame.data[2:4], "little") if frame.data[1] >> 4 == CHARGE else 0
                 heard.current_dA.setdefault(frame.can_id & 63, []).append((frame.time_s, told))
-            if frame.can_id != strange_id and names[frame.can_id] not in UNPROTECTED:
+            if database.name_of(frame.can_id) not in UNPROTECTED:
                 receivers.setdefault(frame.can_id, Receiver()).accepts(frame.can_id, frame.data)
         for can_id, receiver in receivers.items():
             checks = receiver.checks
