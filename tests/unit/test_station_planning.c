@@ -24,7 +24,8 @@ static void test_a_soc_frame_in_gives_a_setpoint_frame_out_through_every_hop(voi
     bench_assert_one_vehicle_in_the_snapshot();
     TEST_ASSERT_EQUAL(TAPER_VERDICT_SOLVED, bench.station.planner.verdict);
     TEST_ASSERT_EQUAL(TAPER_MODE_PLAN, taper_station_mode(&bench.station));
-    TEST_ASSERT_INT32_WITHIN(80, 8000, bench.station.plan_W[0][0]); /* 11 kW - half of 6 kW, within tolerance */
+    TEST_ASSERT_INT32_WITHIN(80, 8000,
+                             bench.station.plan_W[0][0]); /* 11 kW - half of 6 kW, within tolerance */
     TEST_ASSERT_EQUAL_INT32(8000, bench.station.proposal.ceiling_W[0]);
     /* 8000 W / 690 V = 11.594 A, up to the step */
     TEST_ASSERT_EQUAL_INT32(11600, bench.station.setpoints.current_mA[0]);

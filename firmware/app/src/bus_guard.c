@@ -30,7 +30,10 @@ static void leave_alone(taper_station_t *station, uint8_t bus, taper_event_code_
     const unsigned longer_s = guard->backoff_s * 2u;
     guard->backoff_s = (uint8_t)(longer_s < LONGEST_PAUSE_s ? longer_s : LONGEST_PAUSE_s);
     taper_station_count(station, TAPER_COUNTER_BUS_OFF);
-    taper_event_note(&station->events, why, bus, 0, bus);
+    if (!guard->in_trouble) {
+        taper_event_note(&station->events, why, bus, 0, bus);
+    }
+    guard->in_trouble = true;
 }
 
 static void try_again(taper_station_t *station, uint8_t bus, bool is_off, uint32_t now_ms) {
@@ -41,7 +44,6 @@ static void try_again(taper_station_t *station, uint8_t bus, bool is_off, uint32
     }
     guard->silent = false;
     guard->back_ms = now_ms;
-    taper_event_note(&station->events, TAPER_EVENT_BUS_BACK, bus, 0, bus);
 }
 
 static void update_one(taper_station_t *station, uint8_t bus, uint32_t now_ms) {
@@ -89,6 +91,9 @@ bool taper_bus_guard_send(taper_station_t *station, const taper_frame_t *frame, 
     taper_station_count(station, taken ? TAPER_COUNTER_FRAMES_SENT : TAPER_COUNTER_SEND_REFUSED);
     if (!taken) {
         note_refusal(station, frame->bus, now_ms);
+    } else if (guard->in_trouble) {
+        guard->in_trouble = false;
+        taper_event_note(&station->events, TAPER_EVENT_BUS_BACK, frame->bus, 0, frame->bus);
     }
     guard->refusing = !taken && !guard->silent;
     return taken;

@@ -55,7 +55,8 @@ static taper_reason_t reason_of_current(const taper_station_t *station, uint8_t 
         return TAPER_REASON_VEHICLE_LIMIT;
     }
     const taper_reason_t limit = binding_limit(station, i);
-    return target_mA == 0 && demand->min_mA > 0 && station->limit_now.site_W > 0 ? TAPER_REASON_WAITING : limit;
+    return target_mA == 0 && demand->min_mA > 0 && station->limit_now.site_W > 0 ? TAPER_REASON_WAITING
+                                                                                 : limit;
 }
 
 taper_reason_t taper_station_reason(const taper_station_t *station, uint8_t connector) {
@@ -64,7 +65,9 @@ taper_reason_t taper_station_reason(const taper_station_t *station, uint8_t conn
     if (idle != TAPER_REASON_PLANNED) {
         return idle;
     }
-    const bool nobody = station->stopped || station->rival_heard || station->supervisor.mode == TAPER_MODE_INIT;
+    const bool nobody = station->stopped || station->rival_heard ||
+                        station->supervisor.mode == TAPER_MODE_INIT ||
+                        station->bus[station->options.config->connectors[connector].bus].silent;
     if (nobody || !station->snapshot.demand[connector].active) {
         return TAPER_REASON_STATION;
     }

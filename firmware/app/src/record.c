@@ -11,7 +11,8 @@
 
 _Static_assert(sizeof(taper_station_record_t) == 16, "a record without padding");
 
-static bool read_copy(const taper_port_t *port, unsigned copy, taper_station_record_t *record, bool *present) {
+static bool read_copy(const taper_port_t *port, unsigned copy, taper_station_record_t *record,
+                      bool *present) {
     if (!port->store_read(port->context, copy, record, sizeof *record)) {
         return false;
     }
@@ -37,12 +38,15 @@ static unsigned find_newest(taper_station_t *station, unsigned *present) {
     return good;
 }
 
+/** What could not be written is not on record, and will be tried again. */
 static void write_record(taper_station_t *station) {
     const taper_port_t *port = station->options.port;
-    station->record.sequence++;
-    station->record.failsafe_W = station->limits.failsafe_W;
-    station->record.crc32 = taper_crc32((const uint8_t *)&station->record, COVERED);
-    if (port->store_write(port->context, station->record_copy, &station->record, sizeof station->record)) {
+    taper_station_record_t record = station->record;
+    record.sequence++;
+    record.failsafe_W = station->limits.failsafe_W;
+    record.crc32 = taper_crc32((const uint8_t *)&record, COVERED);
+    if (port->store_write(port->context, station->record_copy, &record, sizeof record)) {
+        station->record = record;
         station->record_copy = (uint8_t)((station->record_copy + 1u) % TAPER_STORE_COPIES);
     }
 }
