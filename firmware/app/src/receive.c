@@ -204,7 +204,7 @@ static void take_transfer(taper_station_t *station, const taper_frame_t *frame) 
     }
 }
 
-static void take_report(taper_station_t *station, const taper_frame_t *frame) {
+static void take_report(taper_station_t *station, taper_frame_t *frame) {
     sender_t sender;
     taper_message_t message;
     bool bad_field = false;
@@ -212,6 +212,7 @@ static void take_report(taper_station_t *station, const taper_frame_t *frame) {
         taper_station_count(station, TAPER_COUNTER_FRAMES_UNKNOWN);
         return;
     }
+    frame->time_ms = taper_node_guard_time(sender.guard, frame->time_ms);
     const uint32_t most_per_second = TOO_MUCH * (sender.connector < 0 ? GATEWAY_NOMINAL : CONNECTOR_NOMINAL);
     if (!taper_node_guard_passes(station, sender.guard, most_per_second, frame) ||
         !is_good(station, sender.receiver, frame)) {
@@ -226,7 +227,7 @@ static void take_report(taper_station_t *station, const taper_frame_t *frame) {
     }
 }
 
-static void take_frame(taper_station_t *station, const taper_frame_t *frame) {
+static void take_frame(taper_station_t *station, taper_frame_t *frame) {
     taper_station_count(station, TAPER_COUNTER_FRAMES_RECEIVED);
     if ((unsigned)frame->id >> 6 == TAPER_MESSAGE_ISOTP_FROM) {
         take_transfer(station, frame);
