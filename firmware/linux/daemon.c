@@ -17,7 +17,8 @@
 
 typedef struct {
     const taper_options_t *options;
-    uint64_t start_us; /**< CLOCK_MONOTONIC at station time 0 */
+    uint64_t start_us;      /**< CLOCK_MONOTONIC at station time 0 */
+    uint64_t start_wall_us; /**< wall clock then */
     uint32_t tick_ms;
     uint64_t missed_ticks;
     taper_socketcan_t can;
@@ -89,10 +90,23 @@ static bool fail(const char *what, const char *reason) {
     return false;
 }
 
+#define FUNCTION(name)   {TAPER_MESSAGE_##name << 6, 0x7C0}
+#define GATEWAY_ID(name) {TAPER_MESSAGE_##name << 6 | TAPER_NODE_GATEWAY, 0x7FF}
+
+/** What the station listens to. SETPOINT and CTRL_STATUS are its own to send: heard, they come from a second controller. */
+static const taper_socketcan_filter_t filters[] = {
+    FUNCTION(EMCY),        GATEWAY_ID(SITE_LIMIT), FUNCTION(SETPOINT),     FUNCTION(EVSE_STATUS),
+    FUNCTION(EV_STATUS),   FUNCTION(EVSE_ELEC),    GATEWAY_ID(SITE_METER), GATEWAY_ID(TIME_SYNC),
+    FUNCTION(CTRL_STATUS), FUNCTION(EV_PARAM_A),   FUNCTION(EV_PARAM_B),   FUNCTION(EV_PARAM_C),
+    FUNCTION(EV_PARAM_D),  FUNCTION(EVSE_INFO),    FUNCTION(ISOTP_FROM),
+};
+
 static bool open_can(daemon_t *daemon, const taper_options_t *options) {
     char reason[256] = "";
     const taper_socketcan_options_t can = {.interfaces = options->interfaces,
                                            .count = options->interface_count,
+                                           .filters = filters,
+                                           .filter_count = sizeof filters / sizeof filters[0],
                                            .now_ms = station_ms,
                                            .clock_context = daemon};
     if (!taper_socketcan_open(&daemon->can, &can, reason, sizeof reason)) {
@@ -104,7 +118,7 @@ static bool open_can(daemon_t *daemon, const taper_options_t *options) {
 
 static bool open_record(daemon_t *daemon, const taper_options_t *options) {
     // Whole milliseconds: so are all times in the recording.
-    const uint64_t start_us = taper_log_wall_us() / 1000 * 1000;
+    const uint64_t start_us = daemon->start_wall_us / 1000 * 1000;
     if (options->record != NULL &&
         !taper_record_open(&daemon->record, options->record, options->interfaces, start_us)) {
         char reason[512];
@@ -221,11 +235,16 @@ int taper_daemon_run(const taper_options_t *options, taper_made_t *made) {
     taper_log_open(options->log_level);
     set_signals(daemon);
     taper_notify_open(&daemon->notify);
+    // The station first: it takes its time, and station time 0 should be now.
+    if (!open_station(daemon, options, made)) {
+        return TAPER_EXIT_FAILURE;
+    }
     daemon->start_us = taper_board_steady_us();
+    daemon->start_wall_us = taper_log_wall_us();
     if (!open_can(daemon, options)) {
         return TAPER_EXIT_FAILURE;
     }
-    if (!open_record(daemon, options) || !open_station(daemon, options, made)) {
+    if (!open_record(daemon, options)) {
         taper_socketcan_close(&daemon->can);
         return TAPER_EXIT_FAILURE;
     }

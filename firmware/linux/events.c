@@ -1,6 +1,5 @@
 #include "events.h"
 
-#include <ctype.h>
 #include <inttypes.h>
 #include <stdio.h>
 
@@ -41,6 +40,7 @@ taper_event_kind_t taper_event_kind(uint8_t code) {
         KIND(EMCY_HEARD, WARNING, "code");
         KIND(LIMIT_NEGATIVE, WARNING, NULL);
         KIND(GUARD, ERROR, NULL);
+        KIND(IDENTIFIED, INFO, NULL);
     }
     return (taper_event_kind_t){NULL, TAPER_LOG_WARNING, "data"};
 }
@@ -63,21 +63,33 @@ static void print_name(char *text, size_t size, const taper_event_kind_t *kind, 
     }
     size_t i = 0;
     for (; kind->name[i] != '\0' && i + 1 < size; i++) {
-        text[i] = (char)tolower((unsigned char)kind->name[i]);
+        const char c = kind->name[i];
+        text[i] = (char)(c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c);
     }
     text[i] = '\0';
+}
+
+/** The identifier itself is for the log as well: who was there is what people look for later. */
+static void print_identifier(const taper_station_t *station, const taper_event_t *event, char *text,
+                             size_t size) {
+    const int connector = taper_session_connector(station->options.config, event->bus, event->node);
+    (void)snprintf(text, size, "bus=%u node=%u identifier=\"%s\"", (unsigned)event->bus,
+                   (unsigned)event->node,
+                   connector < 0 ? "" : taper_transfers_identifier(&station->transfers, (uint8_t)connector));
 }
 
 static void log_event(const taper_station_t *station, const taper_event_t *event, uint32_t now_ms) {
     const taper_event_kind_t kind = taper_event_kind(event->code);
     char name[32];
-    char about[64] = "";
+    char about[96] = "";
     int used = 0;
     print_name(name, sizeof name, &kind, event->code);
     if (event->node != 0) {
         used = snprintf(about, sizeof about, "bus=%u node=%u", (unsigned)event->bus, (unsigned)event->node);
     }
-    if (event->code == TAPER_EVENT_MODE) {
+    if (event->code == TAPER_EVENT_IDENTIFIED) {
+        print_identifier(station, event, about, sizeof about);
+    } else if (event->code == TAPER_EVENT_MODE) {
         (void)snprintf(about, sizeof about, "mode=%s limit_W=%" PRId32, taper_mode_name((uint8_t)event->data),
                        taper_station_site_limit_W(station));
     } else if (kind.data != NULL) {

@@ -221,6 +221,9 @@ static int run(ev_t *ev, int timer) {
         sim_results_print(&ev->results, stdout);
         print_excess("drawn", &ev->field.tracker.drawn);
         print_excess("allowed", &ev->field.tracker.may);
+        if (ev->field.send_refused > 0) {
+            printf("the bus took %u frames only at a later try, or never\n", ev->field.send_refused);
+        }
         code = ev->results.violation_ticks > 0 ? SIM_EXIT_VIOLATION : SIM_EXIT_OK;
     }
     sim_field_free(&ev->field);

@@ -53,15 +53,13 @@ enum {
     KEY_SEED,
     KEY_OUT,
     KEY_PROBLEMS,
-    KEY_FIRST_OF_REPLAY,
-    KEY_REPLAY_LOG = KEY_FIRST_OF_REPLAY,
+    KEY_REPLAY_LOG, // the first that only a replay knows
     KEY_CAN,
     KEY_FAILSAFE,
     KEY_TICK_MS,
     KEY_TIME_SCALE,
     KEY_ITERATIONS,
-    KEY_NO_PLANNER,
-    KEY_LAST_OF_REPLAY = KEY_NO_PLANNER,
+    KEY_NO_PLANNER, // the last of them
 };
 
 static const struct argp_option options[] = {
@@ -140,14 +138,14 @@ static bool is_of_both(int key) {
 }
 
 static bool is_of_replay(int key) {
-    return key >= KEY_FIRST_OF_REPLAY && key <= KEY_LAST_OF_REPLAY;
+    return key >= KEY_REPLAY_LOG && key <= KEY_NO_PLANNER;
 }
 
 /** Remember one option of either kind, to refuse what makes no sense together. */
 static void note_option(sim_options_t *chosen, int key) {
     if (is_of_replay(key)) {
         chosen->replay_option = key == KEY_REPLAY_LOG ? chosen->replay_option : name_of(key);
-    } else if (key >= KEY_SESSIONS && key < KEY_FIRST_OF_REPLAY && !is_of_both(key)) {
+    } else if (key >= KEY_SESSIONS && key < KEY_REPLAY_LOG && !is_of_both(key)) {
         chosen->run_option = name_of(key);
     }
     chosen->station_given = chosen->station_given || key == KEY_STATION;

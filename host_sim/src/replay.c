@@ -10,9 +10,9 @@
 #include "replay_log.h"
 #include "taper/stations.h"
 
-/** A log that is not the station's own tells when a frame was on the bus: so long after its call, or before, by a guess. */
+/** In a log that is not the station's own, a sent frame may stand so long after its call, or before, for times are guessed. */
 #define LATE_ms  900
-#define EARLY_ms 20
+#define EARLY_ms 200
 
 typedef struct {
     sim_replay_log_t log;
@@ -64,19 +64,16 @@ static bool is_diagnosis(const taper_frame_t *frame) {
     return frame->id >> 6 == TAPER_MESSAGE_CTRL_DIAG;
 }
 
-/** Whether the frame was surely sent before (< 0) or after (> 0) the present call, or may be of it (0). */
-static int compare_time(const replay_t *replay, uint64_t time_ms) {
-    if (time_ms + (replay->log.exact ? 0 : EARLY_ms) < replay->now_ms) {
-        return -1;
-    }
-    return time_ms > replay->now_ms + (replay->log.exact ? 0 : LATE_ms) ? 1 : 0;
+/** Whether a sent frame with this time is surely of a later call. */
+static bool is_later(const replay_t *replay, uint64_t time_ms) {
+    return time_ms > replay->now_ms + (replay->log.exact ? 0 : LATE_ms);
 }
 
 /** The station's next frame that the recording holds for this call with the identifier of `frame`, or NULL. */
 static sim_replay_frame_t *find_recorded(const replay_t *replay, const taper_frame_t *frame) {
     for (size_t i = replay->first_open; i < replay->log.count; i++) {
         sim_replay_frame_t *recorded = &replay->log.frame[i];
-        if (recorded->sent && compare_time(replay, recorded->time_ms) > 0) {
+        if (recorded->sent && is_later(replay, recorded->time_ms)) {
             return NULL;
         }
         if (recorded->sent && !replay->compared[i] && recorded->frame.id == frame->id &&

@@ -66,7 +66,7 @@ static void note(sim_excess_t *excess, uint64_t now_ms, uint64_t passed_ms, doub
 
 void sim_tracker_look(sim_tracker_t *tracker, uint64_t now_ms, double limit_kw, const double *drawn_kw,
                       const double *may_kw) {
-    double group_kw[TAPER_MAX_GROUPS];
+    double group_kw[TAPER_MAX_GROUPS] = {0};
     const uint64_t passed_ms = tracker->started ? now_ms - tracker->last_ms : 0;
     update_limit(tracker, now_ms, limit_kw);
     note(&tracker->drawn, now_ms, passed_ms,

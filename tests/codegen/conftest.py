@@ -11,7 +11,7 @@ from cantools.database.can import Database
 
 ROOT = Path(__file__).resolve().parents[2]
 CODEGEN = ROOT / "codegen"
-STATIONS = ("hub", "garage", "paper")
+STATIONS = ("hub", "garage", "paper", "depot")
 sys.path.insert(0, str(CODEGEN))
 
 from bus_dbc import compact_dbc  # noqa: E402  (found by the path above)
@@ -38,7 +38,7 @@ def real(request: pytest.FixtureRequest) -> str:
 
 @pytest.fixture(scope="session")
 def tree(generate: Run, real: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Everything generated for the three stations, once for each real type."""
+    """Everything generated for all stations, once for each real type."""
     out = tmp_path_factory.mktemp("generated") / real
     done = generate("--stations", ",".join(STATIONS), "--real", real, "--out", out)
     assert done.returncode == 0, done.stderr

@@ -59,5 +59,5 @@ def test_sizes_are_the_greatest_of_the_stations(tree: Path, real: str) -> None:
     sizes = (tree / "include/taper/sizes.h").read_text()
     assert "#define TAPER_MAX_CONNECTORS 130\n" in sizes
     assert "#define TAPER_MAX_STEPS 24\n" in sizes
-    assert "#define TAPER_MAX_GROUPS 3\n" in sizes
+    assert "#define TAPER_MAX_GROUPS 4\n" in sizes
     assert f"#define TAPER_REAL_IS_DOUBLE {int(real == 'double')}\n" in sizes

@@ -3,4 +3,14 @@
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parent))
+import pytest
+
+HERE = Path(__file__).resolve().parent
+DBC = str(HERE.parents[1] / "codegen" / "taper.dbc")
+sys.path.insert(0, str(HERE))
+
+
+@pytest.fixture(scope="session")
+def wire():
+    from peer.wire import Wire
+    return Wire(DBC)

@@ -190,6 +190,7 @@ def main(arguments: list[str] | None = None) -> int:
         return EXIT_USAGE
     with bus:
         program = Program(options, bus, Wire(str(options.dbc)))
+        print(f"independent.py: on {options.can}", file=sys.stderr, flush=True)
         program.run()
     report = program.report()
     text = json.dumps(report, indent=1) + "\n"

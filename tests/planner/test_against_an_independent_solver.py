@@ -18,7 +18,7 @@ SOLVED, INACCURATE = 2, 3  # taper_verdict_t
 DOUBLE = os.environ["TAPER_REAL"] == "double"
 TOLERANCE = 1e-3 if DOUBLE else 5e-3
 GOOD = {SOLVED} if DOUBLE else {SOLVED, INACCURATE}
-STATIONS = ["hub", "garage", "paper"]
+STATIONS = ["hub", "garage", "paper", "depot"]
 
 
 def probe(station: Station, demands: dict[int, Demand], limit_W: list[int]) -> tuple[int, int, np.ndarray]:

@@ -14,7 +14,7 @@ import os
 import sys
 from pathlib import Path
 
-CONNECTORS = {"hub": 8, "garage": 54, "paper": 130}
+CONNECTORS = {"hub": 8, "garage": 54, "paper": 130, "depot": 60}
 
 
 def parse():

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 TOOLS = Path(__file__).resolve().parents[2] / "tools"
+STATIONS = ("hub", "garage", "paper", "depot")
 
 
 def run(tool: str, *arguments: str) -> str:
@@ -17,10 +18,10 @@ def run(tool: str, *arguments: str) -> str:
 
 def test_memory_has_a_row_for_every_station_and_real_type() -> None:
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in run("memory.py").splitlines()[2:]]
-    assert {(row[0], row[1]) for row in rows} == {(s, r) for s in ("hub", "garage", "paper") for r in ("double", "float")}
+    assert {(row[0], row[1]) for row in rows} == {(s, r) for s in STATIONS for r in ("double", "float")}
     ram = {(row[0], row[1]): int(row[4].replace(",", "")) for row in rows}
-    assert all(ram[station, "float"] < ram[station, "double"] for station in ("hub", "garage", "paper"))
-    assert ram["hub", "float"] < ram["garage", "float"] < ram["paper", "float"]
+    assert all(ram[station, "float"] < ram[station, "double"] for station in STATIONS)
+    assert ram["hub", "float"] < ram["garage", "float"] < ram["depot", "float"] < ram["paper", "float"]
 
 
 def test_the_benchmark_solves_the_same_problems_twice(tmp_path: Path) -> None:

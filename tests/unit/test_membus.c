@@ -210,6 +210,22 @@ static void test_init_empties_a_bus_that_was_in_use(void) {
     TEST_ASSERT_FALSE(port.bus_is_off(port.context, 0));
 }
 
+static void test_the_worlds_port_is_the_other_end_and_takes_every_frame(void) {
+    const taper_port_t world = taper_membus_world_port(&bus);
+    const taper_frame_t sent = numbered(7);
+    taper_frame_t frame;
+    TEST_ASSERT_TRUE(port.send(port.context, &sent));
+    TEST_ASSERT_TRUE(world.receive(world.context, &frame));
+    assert_is_numbered(7, &frame);
+    for (unsigned n = 0; n <= TAPER_MEMBUS_DEPTH; n++) {
+        const taper_frame_t one = numbered(n);
+        TEST_ASSERT_TRUE(world.send(world.context, &one));
+    }
+    TEST_ASSERT_EQUAL_UINT32(1, bus.to_station.overflows);
+    TEST_ASSERT_TRUE(port.receive(port.context, &frame));
+    assert_is_numbered(1, &frame);
+}
+
 static void test_the_port_has_neither_watchdog_nor_clock(void) {
     TEST_ASSERT_TRUE(port.kick_watchdog == NULL);
     TEST_ASSERT_TRUE(port.clock_us == NULL);
@@ -231,6 +247,7 @@ int main(void) {
     RUN_TEST(test_a_bus_that_does_not_exist_is_never_off);
     RUN_TEST(test_a_power_cycle_empties_the_queues_and_keeps_what_was_counted);
     RUN_TEST(test_init_empties_a_bus_that_was_in_use);
+    RUN_TEST(test_the_worlds_port_is_the_other_end_and_takes_every_frame);
     RUN_TEST(test_the_port_has_neither_watchdog_nor_clock);
     return UNITY_END();
 }

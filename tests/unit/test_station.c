@@ -82,7 +82,8 @@ static void test_a_corrupt_frame_is_dropped_and_counted(void) {
 /** Steps of a station whose frames nobody takes, until the queue is full and some were refused. */
 static void step_until_refused(void) {
     bench.deaf = true;
-    for (int tick = 0; tick < 400 && taper_station_counter(&bench.station, TAPER_COUNTER_SEND_REFUSED) == 0; tick++) {
+    for (int tick = 0; tick < 400 && taper_station_counter(&bench.station, TAPER_COUNTER_SEND_REFUSED) == 0;
+         tick++) {
         bench_send_status(1, true);
         bench_send_limit(50000);
         bench_step();

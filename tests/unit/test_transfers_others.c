@@ -30,6 +30,11 @@ static void assert_identifier(uint8_t index, const char *text) {
     TEST_ASSERT_EQUAL_STRING(text, taper_transfers_identifier(&transfers, index));
 }
 
+/** No connector has had the link that they share. */
+static void assert_link_free(void) {
+    TEST_ASSERT_EQUAL_UINT8(transfers.config->connector_count, transfers.connector_index);
+}
+
 static void test_an_identifier_is_kept_for_its_connector(void) {
     assert_identifier(1, "");
     TEST_ASSERT_EQUAL(TAPER_RESULT_IDENTIFIER, tell(&two, "DE*ABC*E123~ 4"));
@@ -43,6 +48,8 @@ static void test_an_identifier_is_kept_for_its_connector(void) {
 static void test_the_longest_identifier_fits_and_a_shorter_one_replaces_it_whole(void) {
     TEST_ASSERT_EQUAL(TAPER_RESULT_IDENTIFIER, tell(&one, "123456789012345678901234"));
     assert_identifier(0, "123456789012345678901234");
+    TEST_ASSERT_EQUAL(TAPER_RESULT_IDENTIFIER, tell(&one, "abcdefghijklmnopqrstuvw"));
+    assert_identifier(0, "abcdefghijklmnopqrstuvw");
     TEST_ASSERT_EQUAL(TAPER_RESULT_IDENTIFIER, tell(&one, "A"));
     assert_identifier(0, "A");
     TEST_ASSERT_EQUAL(TAPER_RESULT_REFUSED, tell(&one, "1234567890123456789012345"));
@@ -63,7 +70,9 @@ static void test_an_empty_identifier_or_a_vehicle_that_leaves_makes_it_forgotten
 
 static void test_a_connector_that_does_not_exist_has_no_identifier(void) {
     taper_transfers_forget(&transfers, UINT8_MAX);
+    taper_transfers_forget(&transfers, TAPER_MAX_CONNECTORS);
     assert_identifier(UINT8_MAX, "");
+    assert_identifier(TAPER_MAX_CONNECTORS, "");
 }
 
 static void test_what_does_not_print_is_refused_and_the_old_one_stays(void) {
@@ -126,6 +135,24 @@ static void test_frames_of_other_functions_are_left_alone(void) {
                       taper_transfers_take(&transfers, &frame, &scene, &curve, &connector));
     TEST_ASSERT_EQUAL_UINT32(0, transfers.refused);
     TEST_ASSERT_FALSE(bench_to_peer(&one));
+    assert_link_free();
+}
+
+static void test_nodes_of_the_same_number_on_two_buses_are_two_connectors(void) {
+    taper_connector_config_t connectors[4];
+    taper_station_config_t station = *transfers.config;
+    memcpy(connectors, station.connectors, sizeof connectors);
+    connectors[2].bus = 1;
+    connectors[2].node = 1;
+    station.connectors = connectors;
+    taper_transfers_init(&transfers, &station);
+    bench_open_peer(&two, 1, 1);
+    TEST_ASSERT_EQUAL(TAPER_RESULT_IDENTIFIER, tell(&one, "ON-BUS-0"));
+    TEST_ASSERT_EQUAL(TAPER_RESULT_IDENTIFIER, tell(&two, "ON-BUS-1"));
+    TEST_ASSERT_EQUAL_UINT8(2, connector);
+    bench_answered(&two, TAPER_ANSWER_ACCEPTED);
+    assert_identifier(0, "ON-BUS-0");
+    assert_identifier(2, "ON-BUS-1");
 }
 
 static void test_a_second_connector_is_not_heard_until_the_first_is_answered(void) {
@@ -166,8 +193,9 @@ static void test_stray_frames_do_not_take_the_link(void) {
                           taper_transfers_take(&transfers, &frame, &scene, &curve, &connector));
     }
     frame.length = 0;
+    frame.data[0] = 0x01;
     (void)taper_transfers_take(&transfers, &frame, &scene, &curve, &connector);
-    TEST_ASSERT_EQUAL_UINT8(0, transfers.connector_node);
+    assert_link_free();
 }
 
 static void note(uint32_t k) {
@@ -215,7 +243,9 @@ static void test_of_a_full_log_the_newest_events_are_sent(void) {
     for (uint32_t k = 0; k < TAPER_EVENTS; k++) {
         note(k);
     }
+    (void)tell(&one, "STAYS");
     request_log();
+    assert_identifier(0, "STAYS"); /* it lies next to the log */
     assert_log(TAPER_EVENTS, 0);
     for (uint32_t k = 0; k < 37; k++) {
         note(TAPER_EVENTS + k);
@@ -277,15 +307,14 @@ static void test_a_frame_that_does_not_leave_does_not_block_the_others(void) {
     TEST_ASSERT_TRUE(bench_from_peer(&gateway, &result));
     bench_send(&one, message, identifier(message, "FIRST"));
     TEST_ASSERT_TRUE(bench_from_peer(&one, &result));
-    bool gateway_asked = false;
-    bool one_asked = false;
-    for (int k = 0; k < 2; k++) { /* neither is sent, and each has its turn */
-        taper_frame_t frame;
+    taper_frame_t frame;
+    for (int k = 0; k < 3; k++) { /* only the connector's is ever sent, and each has its turn */
         TEST_ASSERT_TRUE(taper_transfers_next(&transfers, scene.now_ms, &frame));
-        gateway_asked |= frame.id == 0x63E;
-        one_asked |= frame.id == 0x601;
+        TEST_ASSERT_EQUAL_HEX16(k == 1 ? 0x601 : 0x63E, frame.id);
+        if (frame.id == 0x601) {
+            taper_transfers_sent(&transfers, &frame, scene.now_ms);
+        }
     }
-    TEST_ASSERT_TRUE(gateway_asked && one_asked);
 }
 
 int main(void) {
@@ -299,6 +328,7 @@ int main(void) {
     RUN_TEST(test_a_connector_may_not_send_a_curve);
     RUN_TEST(test_strangers_are_not_heard);
     RUN_TEST(test_frames_of_other_functions_are_left_alone);
+    RUN_TEST(test_nodes_of_the_same_number_on_two_buses_are_two_connectors);
     RUN_TEST(test_a_second_connector_is_not_heard_until_the_first_is_answered);
     RUN_TEST(test_a_connector_that_falls_silent_frees_the_link_after_its_timeout);
     RUN_TEST(test_stray_frames_do_not_take_the_link);

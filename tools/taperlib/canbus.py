@@ -153,7 +153,7 @@ class Receiver:
         self._counter: dict[int, int] = {}
 
     def accepts(self, can_id: int, data: bytes) -> bool:
-        """Whether the frame says something new. One that is out of sequence does, to an onlooker: he may have been away."""
+        """Whether the frame says something new. One out of sequence does, to an onlooker: he may have been away."""
         if len(data) != 8 or data[0] != checksum(can_id, data):
             self.checks.crc_errors += 1
             return False
@@ -170,7 +170,7 @@ class Receiver:
 
 
 def read_log(path: Path, interface: str | None) -> Iterator[Frame]:
-    """Frames of a log of `candump -l` or `-L`, of one interface: by default the first that occurs. Raises InputError."""
+    """Frames of a log of `candump -l` or `-L`, of one interface (the first that occurs). Raises InputError."""
     try:
         with path.open(encoding="ascii", errors="replace") as file:
             yield from _frames_of(path, file, interface)

@@ -28,12 +28,13 @@ EXIT_NOTHING_HEARD, EXIT_USAGE = 1, 2
 DESCRIPTION = """Shows a charging station as its CAN bus shows it: limits, connectors, and why each has the current that
 it has. Only listens, never sends; needs no root. On a terminal the table is live until Ctrl-C; elsewhere it is
 printed once. A reason with a question mark is inferred, because no PLAN frame told it."""
-EPILOG = """Exit code: 0 good; 1 nothing was heard (--once); 2 wrong usage, or an interface or file that cannot be used."""
+EPILOG = "Exit code: 0 good; 1 nothing was heard (--once); 2 wrong usage, or an interface or file that cannot be used."
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="tools/monitor", description=DESCRIPTION, epilog=EPILOG)
-    parser.add_argument("--can", metavar="IFACE", help="SocketCAN interface (default vcan0; with --log: the log's first)")
+    parser.add_argument("--can", metavar="IFACE",
+                        help="SocketCAN interface (default vcan0; with --log: the log's first)")
     parser.add_argument("--log", type=Path, metavar="FILE", help="a log of `candump -l` instead, at its own pace")
     parser.add_argument("--dbc", type=Path, default=ROOT / "codegen" / "taper.dbc",
                         help="CAN database (default codegen/taper.dbc)")
@@ -116,9 +117,9 @@ def _advice(interface: str, error: OSError) -> InputError:
     if error.errno == errno.EAFNOSUPPORT:
         return InputError(f"{interface}: this kernel has no CAN. Run it as: tools/with-vcan tools/monitor ...")
     if error.errno == errno.ENODEV:
-        return InputError(f"{interface}: there is no such interface. A virtual one: sudo ip link add dev {interface} type "
-                          f"vcan && sudo ip link set {interface} up; or without root: tools/with-vcan -i {interface} "
-                          "COMMAND")
+        return InputError(f"{interface}: there is no such interface. A virtual one: sudo ip link add dev {interface} "
+                          f"type vcan && sudo ip link set {interface} up; without root: tools/with-vcan -i "
+                          f"{interface} COMMAND")
     return InputError(f"{interface}: {error.strerror or error}")
 
 
@@ -147,7 +148,8 @@ def _moments(source: LiveSource | LogSource, view: StationView, seconds: float |
         yield now_s
 
 
-def _print_once(source: LiveSource | LogSource, view: StationView, options: argparse.Namespace, console: Console) -> int:
+def _print_once(source: LiveSource | LogSource, view: StationView, options: argparse.Namespace,
+                console: Console) -> int:
     seconds = options.seconds or (None if options.log else ONCE_S)
     now_s = 0.0
     for now_s in _moments(source, view, seconds):
@@ -169,11 +171,12 @@ def _print_json(source: LiveSource | LogSource, view: StationView, options: argp
     return 0
 
 
-def _show_live(source: LiveSource | LogSource, view: StationView, options: argparse.Namespace, console: Console) -> int:
+def _show_live(source: LiveSource | LogSource, view: StationView, options: argparse.Namespace,
+               console: Console) -> int:
     def picture(now_s: float):
         return screen(view, now_s, source.label, options.utc, console.width, console.height)
 
-    now_s = shown_s = 0.0
+    shown_s = now_s = 0.0
     with Live(console=console, screen=True, auto_refresh=False) as live:
         for now_s in _moments(source, view, options.seconds):
             if time.monotonic() >= shown_s + REFRESH_S:

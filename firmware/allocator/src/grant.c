@@ -3,8 +3,9 @@
 #include "taper/ledger.h"
 
 /** What is left when every connector draws what it may. A room can be negative: the limit fell. */
-static void open_rooms_left(taper_rooms_t *rooms, const taper_ledger_t *ledger, const taper_station_config_t *config,
-                            const taper_snapshot_t *snapshot, int32_t site_limit_W) {
+static void open_rooms_left(taper_rooms_t *rooms, const taper_ledger_t *ledger,
+                            const taper_station_config_t *config, const taper_snapshot_t *snapshot,
+                            int32_t site_limit_W) {
     taper_rooms_open(rooms, config, site_limit_W);
     for (uint8_t i = 0; i < config->connector_count; i++) {
         const int32_t W_per_A = taper_rooms_W_per_A(config, snapshot, i);
@@ -18,8 +19,9 @@ static int32_t whole_or_none_mA(const taper_snapshot_t *snapshot, uint8_t i, int
 }
 
 /** The most up to `target_mA` that fits; what it was told already if nothing does or too little for its minimum. */
-static int32_t raised_mA(const taper_rooms_t *rooms, const taper_ledger_t *ledger, const taper_station_config_t *config,
-                         const taper_snapshot_t *snapshot, uint8_t i, int32_t target_mA) {
+static int32_t raised_mA(const taper_rooms_t *rooms, const taper_ledger_t *ledger,
+                         const taper_station_config_t *config, const taper_snapshot_t *snapshot, uint8_t i,
+                         int32_t target_mA) {
     const int32_t told_mA = taper_ledger_told_mA(ledger, i);
     const int64_t room_mW = taper_rooms_least(rooms, config, i);
     if (room_mW < 0) {
@@ -32,8 +34,9 @@ static int32_t raised_mA(const taper_rooms_t *rooms, const taper_ledger_t *ledge
     return taper_max_i32(current_mA, told_mA);
 }
 
-static void raise_one(taper_rooms_t *rooms, const taper_ledger_t *ledger, const taper_station_config_t *config,
-                      const taper_snapshot_t *snapshot, uint8_t i, int32_t target_mA, int32_t *granted_mA) {
+static void raise_one(taper_rooms_t *rooms, const taper_ledger_t *ledger,
+                      const taper_station_config_t *config, const taper_snapshot_t *snapshot, uint8_t i,
+                      int32_t target_mA, int32_t *granted_mA) {
     const int32_t more_mA = raised_mA(rooms, ledger, config, snapshot, i, target_mA);
     const int32_t taken_mA = taper_max_i32(more_mA - taper_ledger_may_mA(ledger, i), 0);
     taper_rooms_take(rooms, config, i, (int64_t)taken_mA * taper_rooms_W_per_A(config, snapshot, i));

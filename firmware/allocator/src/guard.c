@@ -21,7 +21,8 @@ bool taper_guard_passes(const taper_station_config_t *config, const taper_snapsh
             return false;
         }
         if (current_mA > 0) {
-            sum_mW[config->connectors[i].group] += (int64_t)current_mA * taper_demand_booked_W_per_A(&snapshot->demand[i]);
+            sum_mW[config->connectors[i].group] +=
+                (int64_t)current_mA * taper_demand_booked_W_per_A(&snapshot->demand[i]);
         }
     }
     for (uint8_t k = config->group_count; k-- > 0;) { /* children stand behind their parents */

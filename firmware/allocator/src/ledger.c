@@ -76,7 +76,8 @@ static void hear_echo(taper_ledger_entry_t *entry, unsigned counter) {
     }
 }
 
-void taper_ledger_hear(taper_ledger_t *ledger, uint8_t connector, const taper_evse_status_t *status, uint32_t at_ms) {
+void taper_ledger_hear(taper_ledger_t *ledger, uint8_t connector, const taper_evse_status_t *status,
+                       uint32_t at_ms) {
     taper_ledger_entry_t *entry = &ledger->entry[connector];
     if (!status->ev_present || status->pilot == TAPER_PILOT_A) {
         close_all(entry); /* a setpoint does not outlive its session */

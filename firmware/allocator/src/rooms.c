@@ -18,13 +18,15 @@ int64_t taper_rooms_least(const taper_rooms_t *rooms, const taper_station_config
     return least;
 }
 
-void taper_rooms_take(taper_rooms_t *rooms, const taper_station_config_t *config, uint8_t i, int64_t power_mW) {
+void taper_rooms_take(taper_rooms_t *rooms, const taper_station_config_t *config, uint8_t i,
+                      int64_t power_mW) {
     for (uint8_t k = config->connectors[i].group; k != TAPER_NO_GROUP; k = config->groups[k].parent) {
         rooms->room_mW[k] -= power_mW;
     }
 }
 
-int32_t taper_rooms_W_per_A(const taper_station_config_t *config, const taper_snapshot_t *snapshot, uint8_t i) {
+int32_t taper_rooms_W_per_A(const taper_station_config_t *config, const taper_snapshot_t *snapshot,
+                            uint8_t i) {
     const taper_connector_config_t *connector = &config->connectors[i];
     if (snapshot->demand[i].active) {
         return taper_demand_booked_W_per_A(&snapshot->demand[i]);

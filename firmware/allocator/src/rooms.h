@@ -15,9 +15,11 @@ void taper_rooms_open(taper_rooms_t *rooms, const taper_station_config_t *config
 int64_t taper_rooms_least(const taper_rooms_t *rooms, const taper_station_config_t *config, uint8_t i);
 
 /** Take `power_mW` from all of them. */
-void taper_rooms_take(taper_rooms_t *rooms, const taper_station_config_t *config, uint8_t i, int64_t power_mW);
+void taper_rooms_take(taper_rooms_t *rooms, const taper_station_config_t *config, uint8_t i,
+                      int64_t power_mW);
 
 /** What 1 A of connector `i` counts: as its demand says, or by its description while there is none. */
-int32_t taper_rooms_W_per_A(const taper_station_config_t *config, const taper_snapshot_t *snapshot, uint8_t i);
+int32_t taper_rooms_W_per_A(const taper_station_config_t *config, const taper_snapshot_t *snapshot,
+                            uint8_t i);
 
 #endif

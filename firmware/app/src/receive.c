@@ -1,6 +1,4 @@
 /* Frames in: who sent them, whether to believe them, and where they go. */
-#include <string.h>
-
 #include "station_internal.h"
 #include "taper/codec.h"
 
@@ -9,9 +7,9 @@
 
 /** Nominal frames a second, rounded up: EVSE_STATUS, EV_STATUS, EVSE_ELEC, EV_PARAM_A..D, EVSE_INFO; and the gateway's
     SITE_LIMIT, SITE_METER, TIME_SYNC. Three times that is too much. */
-#define CONNECTOR_NOMINAL                                                                               \
-    (1000u / TAPER_EVSE_STATUS_CYCLE_ms + 1000u / TAPER_EV_STATUS_CYCLE_ms + 1000u / TAPER_EVSE_ELEC_CYCLE_ms + \
-     4000u / TAPER_EV_PARAM_A_CYCLE_ms + 1u)
+#define CONNECTOR_NOMINAL                                                    \
+    (1000u / TAPER_EVSE_STATUS_CYCLE_ms + 1000u / TAPER_EV_STATUS_CYCLE_ms + \
+     1000u / TAPER_EVSE_ELEC_CYCLE_ms + 4000u / TAPER_EV_PARAM_A_CYCLE_ms + 1u)
 #define GATEWAY_NOMINAL 3u
 #define TOO_MUCH        3u
 
@@ -65,7 +63,8 @@ static bool find_sender(taper_station_t *station, const taper_frame_t *frame, se
     if (place < 0 || connector < 0) {
         return false;
     }
-    *sender = (sender_t){&station->connector_guard[connector], &station->connector_e2e[connector][place], connector};
+    *sender = (sender_t){&station->connector_guard[connector], &station->connector_e2e[connector][place],
+                         connector};
     return true;
 }
 
@@ -135,7 +134,9 @@ static void hear_emcy(taper_station_t *station, const sender_t *sender, const ta
 static void use_message(taper_station_t *station, const sender_t *sender, const taper_message_t *message,
                         uint32_t at_ms) {
     switch (message->kind) {
-    case TAPER_MESSAGE_SITE_LIMIT: taper_limits_apply(&station->limits, &message->as.site_limit, at_ms); break;
+    case TAPER_MESSAGE_SITE_LIMIT:
+        taper_limits_apply(&station->limits, &message->as.site_limit, at_ms);
+        break;
     case TAPER_MESSAGE_SITE_METER:
         taper_limits_apply_meter(&station->limits, &message->as.site_meter, at_ms);
         break;
@@ -171,15 +172,19 @@ static bool is_ours_to_send(const taper_frame_t *frame) {
 
 static void set_curve(taper_station_t *station) {
     const taper_status_t status = taper_limits_set_curve(&station->limits, &station->incoming_curve);
-    taper_transfers_answer(&station->transfers, status == TAPER_OK ? TAPER_ANSWER_ACCEPTED : TAPER_ANSWER_CONTENT,
+    taper_transfers_answer(&station->transfers,
+                           status == TAPER_OK ? TAPER_ANSWER_ACCEPTED : TAPER_ANSWER_CONTENT,
                            station->events.now_ms);
     if (status == TAPER_OK) {
-        taper_station_count(station, TAPER_COUNTER_TRANSFERS);
         taper_event_note(&station->events, TAPER_EVENT_CURVE_SET, 0, TAPER_NODE_GATEWAY,
                          station->incoming_curve.count);
-    } else {
-        taper_station_count(station, TAPER_COUNTER_TRANSFERS_REFUSED);
     }
+}
+
+static void note_identifier(taper_station_t *station, const taper_frame_t *frame, uint8_t connector) {
+    const bool known = taper_transfers_identifier(&station->transfers, connector)[0] != '\0';
+    taper_event_note(&station->events, TAPER_EVENT_IDENTIFIED, frame->bus, (uint8_t)(frame->id & 0x3Fu),
+                     known);
 }
 
 static void take_transfer(taper_station_t *station, const taper_frame_t *frame) {
@@ -192,17 +197,14 @@ static void take_transfer(taper_station_t *station, const taper_frame_t *frame) 
     uint8_t connector = 0;
     switch (taper_transfers_take(&station->transfers, frame, &scene, &station->incoming_curve, &connector)) {
     case TAPER_RESULT_CURVE: set_curve(station); break;
-    case TAPER_RESULT_IDENTIFIER: taper_station_count(station, TAPER_COUNTER_TRANSFERS); break;
-    case TAPER_RESULT_REFUSED:
-        taper_station_count(station, TAPER_COUNTER_TRANSFERS_REFUSED);
-        taper_event_note(&station->events, TAPER_EVENT_TRANSFER_REFUSED, frame->bus, (uint8_t)(frame->id & 0x3Fu), 0);
-        break;
+    case TAPER_RESULT_IDENTIFIER: note_identifier(station, frame, connector); break;
+    case TAPER_RESULT_REFUSED: /* counted there, and noted with those that ran out of time */
     case TAPER_RESULT_NONE:
     default: break;
     }
 }
 
-static void take_report(taper_station_t *station, const taper_frame_t *frame) {
+static void take_report(taper_station_t *station, taper_frame_t *frame) {
     sender_t sender;
     taper_message_t message;
     bool bad_field = false;
@@ -210,6 +212,7 @@ static void take_report(taper_station_t *station, const taper_frame_t *frame) {
         taper_station_count(station, TAPER_COUNTER_FRAMES_UNKNOWN);
         return;
     }
+    frame->time_ms = taper_node_guard_time(sender.guard, frame->time_ms);
     const uint32_t most_per_second = TOO_MUCH * (sender.connector < 0 ? GATEWAY_NOMINAL : CONNECTOR_NOMINAL);
     if (!taper_node_guard_passes(station, sender.guard, most_per_second, frame) ||
         !is_good(station, sender.receiver, frame)) {
@@ -224,7 +227,7 @@ static void take_report(taper_station_t *station, const taper_frame_t *frame) {
     }
 }
 
-static void take_frame(taper_station_t *station, const taper_frame_t *frame) {
+static void take_frame(taper_station_t *station, taper_frame_t *frame) {
     taper_station_count(station, TAPER_COUNTER_FRAMES_RECEIVED);
     if ((unsigned)frame->id >> 6 == TAPER_MESSAGE_ISOTP_FROM) {
         take_transfer(station, frame);

@@ -11,7 +11,8 @@
 
 _Static_assert(sizeof(taper_station_record_t) == 16, "a record without padding");
 
-static bool read_copy(const taper_port_t *port, unsigned copy, taper_station_record_t *record, bool *present) {
+static bool read_copy(const taper_port_t *port, unsigned copy, taper_station_record_t *record,
+                      bool *present) {
     if (!port->store_read(port->context, copy, record, sizeof *record)) {
         return false;
     }

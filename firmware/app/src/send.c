@@ -7,10 +7,13 @@
 #define VALIDITY_TICKS    3u
 /** Longest that SETPOINT can say. */
 #define VALIDITY_MOST_ms 127000u
+/** Setpoints wait behind frames of transfers: a peer that asks for no gap gets no more than this at a time. */
+#define TRANSFER_FRAMES 8u
 /** PLAN goes round all connectors in this many seconds. */
 #define PLAN_ROUND_s 8u
 
-_Static_assert(VALIDITY_FLOOR_ms > 4u * TAPER_SETPOINT_CYCLE_ms, "a setpoint outlives the loss of some frames");
+_Static_assert(VALIDITY_FLOOR_ms > 4u * TAPER_SETPOINT_CYCLE_ms,
+               "a setpoint outlives the loss of some frames");
 
 uint32_t taper_station_validity_ms(const taper_station_options_t *options) {
     const uint32_t tick_ms = options->config->tick_ms / options->time_scale;
@@ -63,17 +66,29 @@ static void send_setpoint(taper_station_t *station, uint8_t i, uint32_t now_ms) 
     }
     if (taper_station_send_message(station, &message, &station->setpoint_counter[i], now_ms)) {
         taper_ledger_sent(&station->ledger, i, counter, station->setpoints.current_mA[i], now_ms);
-        station->setpoint_due[i] = false;
-        station->setpoint_ms[i] = now_ms;
+        station->sent_mA[i] = station->setpoints.current_mA[i];
+        station->sent_session[i] = station->setpoint_session[i];
+        station->sent_ms[i] = now_ms;
     }
+}
+
+static bool is_due(const taper_station_t *station, uint8_t i, uint32_t now_ms) {
+    return station->setpoints.current_mA[i] != station->sent_mA[i] ||
+           station->setpoint_session[i] != station->sent_session[i] ||
+           taper_elapsed_ms(now_ms, station->sent_ms[i]) >= TAPER_SETPOINT_CYCLE_ms;
 }
 
 void taper_station_send_setpoints(taper_station_t *station, uint32_t now_ms) {
     for (uint8_t i = 0; i < station->options.config->connector_count; i++) {
-        const bool stale = taper_elapsed_ms(now_ms, station->setpoint_ms[i]) >= TAPER_SETPOINT_CYCLE_ms;
-        if (station->setpoint_due[i] || stale) {
+        if (is_due(station, i, now_ms)) {
             send_setpoint(station, i, now_ms);
         }
+    }
+}
+
+void taper_station_forget_sent(taper_station_t *station) {
+    for (uint8_t i = 0; i < station->options.config->connector_count; i++) {
+        station->sent_mA[i] = -1;
     }
 }
 
@@ -100,7 +115,10 @@ void taper_station_send_status(taper_station_t *station, uint32_t now_ms) {
     message.as.ctrl_status = status_of(station);
     const uint8_t buses = taper_station_buses(station->options.config);
     for (message.bus = 0; message.bus < buses; message.bus++) {
-        (void)taper_station_send_message(station, &message, &station->status_counter[message.bus], now_ms);
+        const bool due = station->status_due[message.bus];
+        station->status_due[message.bus] =
+            due &&
+            !taper_station_send_message(station, &message, &station->status_counter[message.bus], now_ms);
     }
 }
 
@@ -108,7 +126,8 @@ static void send_plan(taper_station_t *station, uint8_t i, uint32_t now_ms) {
     const taper_connector_config_t *connector = &station->options.config->connectors[i];
     const taper_demand_t *demand = &station->snapshot.demand[i];
     taper_message_t message = {.kind = TAPER_MESSAGE_PLAN, .bus = connector->bus, .node = connector->node};
-    const bool planned = taper_station_has_plan(station) && demand->active && station->plan_session[i] == demand->session;
+    const bool planned =
+        taper_station_has_plan(station) && demand->active && station->plan_session[i] == demand->session;
     message.as.plan.reason = (uint8_t)taper_station_reason(station, i);
     for (uint8_t t = 0; t < TAPER_PLAN_STEPS; t++) {
         message.as.plan.power_W[t] = planned ? station->plan_W[t][i] : TAPER_ABSENT;
@@ -134,17 +153,30 @@ void taper_station_send_display(taper_station_t *station, uint32_t now_ms) {
         return;
     }
     station->second_ms = now_ms;
-    for (uint8_t k = 0; k < (connectors + PLAN_ROUND_s - 1u) / PLAN_ROUND_s; k++) {
+    for (unsigned k = 0; k < (connectors + PLAN_ROUND_s - 1u) / PLAN_ROUND_s; k++) {
         send_plan(station, station->next_plan, now_ms);
         station->next_plan = (uint8_t)((station->next_plan + 1) % connectors);
     }
     send_diag(station, now_ms);
 }
 
+static void note_transfers(taper_station_t *station) {
+    uint32_t *count = station->counters.count;
+    if (station->transfers.refused != count[TAPER_COUNTER_TRANSFERS_REFUSED]) {
+        taper_event_note(&station->events, TAPER_EVENT_TRANSFER_REFUSED, 0, 0,
+                         taper_saturate_i32(station->transfers.refused));
+    }
+    count[TAPER_COUNTER_TRANSFERS] = station->transfers.accepted;
+    count[TAPER_COUNTER_TRANSFERS_REFUSED] = station->transfers.refused;
+}
+
 void taper_station_send_transfers(taper_station_t *station, uint32_t now_ms) {
     taper_frame_t frame;
-    while (taper_transfers_next(&station->transfers, now_ms, &frame) &&
-           taper_bus_guard_send(station, &frame, now_ms)) {
-        taper_transfers_sent(&station->transfers, &frame, now_ms);
+    for (unsigned k = 0; k < TRANSFER_FRAMES && taper_transfers_next(&station->transfers, now_ms, &frame);
+         k++) {
+        if (taper_bus_guard_send(station, &frame, now_ms)) {
+            taper_transfers_sent(&station->transfers, &frame, now_ms);
+        }
     }
+    note_transfers(station);
 }

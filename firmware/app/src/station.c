@@ -39,6 +39,7 @@ taper_status_t taper_station_init(taper_station_t *station, const taper_station_
     station->options = *options;
     station->options.time_scale = options->time_scale == 0 ? 1 : options->time_scale;
     init_layers(station);
+    taper_station_forget_sent(station);
     taper_record_load(station);
     if (options->solver != NULL) {
         return taper_planner_init(&station->planner, options->solver, options->config);
@@ -88,8 +89,8 @@ static void allocate(taper_station_t *station, int32_t site_limit_W, uint32_t no
         reserved_mA[i] = online ? 0 : taper_ledger_may_mA(&station->ledger, i);
         station->setpoint_session[i] = taper_session_number(&station->sessions, i);
     }
-    taper_allocate(&station->allocator, config, &station->snapshot, &station->proposal, site_limit_W, reserved_mA,
-                   &station->target);
+    taper_allocate(&station->allocator, config, &station->snapshot, &station->proposal, site_limit_W,
+                   reserved_mA, &station->target);
     if (station->rival_heard || station->stopped) {
         memset(&station->target, 0, sizeof station->target);
     }
@@ -99,8 +100,8 @@ static void allocate(taper_station_t *station, int32_t site_limit_W, uint32_t no
 static void grant(taper_station_t *station, taper_setpoints_t *granted) {
     const taper_station_config_t *config = station->options.config;
     const int32_t site_W = station->limit_now.site_W;
-    taper_ledger_grant(&station->ledger, config, &station->snapshot, station->proposal.rank, site_W, &station->target,
-                       granted);
+    taper_ledger_grant(&station->ledger, config, &station->snapshot, station->proposal.rank, site_W,
+                       &station->target, granted);
     if (!taper_guard_passes(config, &station->snapshot, site_W, granted) ||
         !taper_guard_hand_over_passes(&station->ledger, config, &station->snapshot, site_W, granted)) {
         taper_station_count(station, TAPER_COUNTER_GUARD_VIOLATIONS);
@@ -113,18 +114,10 @@ bool taper_station_hands_over(const taper_station_t *station) {
     return memcmp(&station->target, &station->setpoints, sizeof station->target) != 0;
 }
 
-/** Grant again, between ticks: what changed is due. */
+/** Grant again, between ticks. */
 static void regrant(taper_station_t *station) {
-    taper_setpoints_t granted;
-    if (!taper_station_hands_over(station)) {
-        return;
-    }
-    grant(station, &granted);
-    for (uint8_t i = 0; i < station->options.config->connector_count; i++) {
-        if (granted.current_mA[i] != station->setpoints.current_mA[i]) {
-            station->setpoints.current_mA[i] = granted.current_mA[i];
-            station->setpoint_due[i] = true;
-        }
+    if (taper_station_hands_over(station)) {
+        grant(station, &station->setpoints);
     }
 }
 
@@ -145,7 +138,8 @@ static void begin(taper_station_t *station, uint32_t now_ms) {
     if (!station->started) {
         station->started = true;
         taper_ledger_init(&station->ledger, config, taper_station_validity_ms(&station->options), now_ms);
-        taper_event_note(&station->events, TAPER_EVENT_STARTED, 0, 0, taper_saturate_i32(station->record.starts));
+        taper_event_note(&station->events, TAPER_EVENT_STARTED, 0, 0,
+                         taper_saturate_i32(station->record.starts));
     }
     taper_station_receive(station, now_ms);
     taper_ledger_update(&station->ledger, config, now_ms);
@@ -158,6 +152,15 @@ static void copy_counters(taper_station_t *station) {
     count[TAPER_COUNTER_CLOCK_JUMPS] = station->sessions.clock_jumps;
     count[TAPER_COUNTER_SOC_JUMPS] = station->sessions.soc_jumps;
     count[TAPER_COUNTER_PARAMETERS_REPAIRED] = station->sessions.repaired;
+}
+
+/** Who leaves takes his name along. */
+static void forget_identifiers(taper_station_t *station) {
+    for (uint8_t i = 0; i < station->options.config->connector_count; i++) {
+        if (!station->sessions.session[i].vehicle_there) {
+            taper_transfers_forget(&station->transfers, i);
+        }
+    }
 }
 
 static void decide(taper_station_t *station, uint32_t now_ms) {
@@ -178,13 +181,14 @@ void taper_station_step(taper_station_t *station, uint32_t now_ms) {
     begin(station, now_ms);
     taper_session_update(&station->sessions, now_ms);
     taper_limits_update(&station->limits, now_ms);
+    forget_identifiers(station);
     decide(station, now_ms);
-    memset(station->setpoint_due, 1, sizeof station->setpoint_due);
     taper_station_send_setpoints(station, now_ms);
     copy_counters(station);
     taper_station_send_display(station, now_ms);
     taper_alarm_update(station, now_ms);
     taper_station_send_transfers(station, now_ms);
+    memset(station->status_due, 1, sizeof station->status_due);
     taper_station_send_status(station, now_ms);
     taper_record_update(station, now_ms);
     if (port->kick_watchdog != NULL) {
@@ -198,17 +202,18 @@ void taper_station_poll(taper_station_t *station, uint32_t now_ms) {
     taper_station_send_setpoints(station, now_ms);
     taper_alarm_update(station, now_ms);
     taper_station_send_transfers(station, now_ms);
+    taper_station_send_status(station, now_ms);
 }
 
 void taper_station_stop(taper_station_t *station, uint32_t now_ms) {
+    station->events.now_ms = now_ms;
     if (!station->stopped) {
         taper_event_note(&station->events, TAPER_EVENT_STOPPED, 0, 0, 0);
     }
     station->stopped = true;
-    station->events.now_ms = now_ms;
     memset(&station->target, 0, sizeof station->target); /* the fallback current of every connector is 0 */
     memset(&station->setpoints, 0, sizeof station->setpoints);
-    memset(station->setpoint_due, 1, sizeof station->setpoint_due);
+    taper_station_forget_sent(station);
     taper_station_send_setpoints(station, now_ms);
 }
 

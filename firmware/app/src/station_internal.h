@@ -15,6 +15,12 @@ void taper_station_receive(taper_station_t *station, uint32_t now_ms);
 
 /* node_guard.c: babbling nodes, row 16 */
 
+/**
+ * Time of a node's frame, not before that of its last one: a port that works out times from ages may be wrong by a hair, and
+ * a time that goes back would count as one of weeks.
+ */
+uint32_t taper_node_guard_time(const taper_node_guard_t *guard, uint32_t at_ms);
+
 /** Whether a frame of a node is within three times the node's nominal rate, and the node is not babbling. */
 bool taper_node_guard_passes(taper_station_t *station, taper_node_guard_t *guard, uint32_t per_second,
                              const taper_frame_t *frame);
@@ -46,10 +52,13 @@ uint8_t taper_station_buses(const taper_station_config_t *config);
 /** Validity of every setpoint: three control ticks, within what the wire can say. */
 uint32_t taper_station_validity_ms(const taper_station_options_t *options);
 
-/** Send the setpoints that are due, and those that were not repeated for half a second. */
+/** Send the setpoints that changed, and those that were not repeated for half a second. */
 void taper_station_send_setpoints(taper_station_t *station, uint32_t now_ms);
 
-/** CTRL_STATUS on every bus. */
+/** Have all of them sent, whatever was sent before. */
+void taper_station_forget_sent(taper_station_t *station);
+
+/** CTRL_STATUS on every bus where it is due: one that was refused is tried again. */
 void taper_station_send_status(taper_station_t *station, uint32_t now_ms);
 
 /** Once a second: PLAN of some connectors, and one counter. */

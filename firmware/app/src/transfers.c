@@ -33,8 +33,9 @@ void taper_transfers_init(taper_transfers_t *transfers, const taper_station_conf
     open_link(&transfers->gateway, 0, TAPER_NODE_GATEWAY, transfers->gateway_buffer,
               sizeof transfers->gateway_buffer);
     open_link(&transfers->tool, 0, TAPER_NODE_TOOL, transfers->tool_buffer, sizeof transfers->tool_buffer);
-    /* A link to nobody: no frame comes from the controller's own node. */
+    /* Nobody's yet. Nothing is taken for it before somebody claims it. */
     open_link(&transfers->connector, 0, TAPER_NODE_CONTROLLER, NULL, 0);
+    transfers->connector_index = config->connector_count;
 }
 
 /** Index of a connector; connector_count: there is none. */
@@ -52,20 +53,17 @@ static bool begins_message(const taper_frame_t *frame) {
     return frame->length > 0 && frame->data[0] < 0x20u;
 }
 
-/** Give the link of the connectors to the sender of `frame`, if it is free and the frame begins a message. */
+/** Give the link of the connectors to the sender of `frame`, if nothing goes on in it and the frame begins a message. */
 static void claim(taper_transfers_t *transfers, const taper_frame_t *frame) {
     const uint8_t node = frame->id & NODE_MASK;
     const bool is_from = frame->id >> FUNCTION_SHIFT == TAPER_MESSAGE_ISOTP_FROM;
-    const bool has_it = transfers->connector_bus == frame->bus && transfers->connector_node == node;
-    if (!is_from || has_it || !begins_message(frame) || taper_isotp_busy(&transfers->connector)) {
+    if (!is_from || !begins_message(frame) || taper_isotp_busy(&transfers->connector)) {
         return;
     }
     const uint8_t index = connector_at(transfers->config, frame->bus, node);
     if (index == transfers->config->connector_count) {
         return;
     }
-    transfers->connector_bus = frame->bus;
-    transfers->connector_node = node;
     transfers->connector_index = index;
     open_link(&transfers->connector, frame->bus, node, transfers->connector_buffer,
               sizeof transfers->connector_buffer);
@@ -175,7 +173,8 @@ taper_transfer_result_t taper_transfers_take(taper_transfers_t *transfers, const
                                                                        : take_request(transfers, scene);
     }
     claim(transfers, frame);
-    if (transfers->connector_node != 0 && taper_isotp_take(&transfers->connector, frame, scene->now_ms)) {
+    const bool claimed = transfers->connector_index < transfers->config->connector_count;
+    if (claimed && taper_isotp_take(&transfers->connector, frame, scene->now_ms)) {
         return drop_failed(transfers, &transfers->connector, scene->now_ms)
                    ? TAPER_RESULT_REFUSED
                    : take_identifier(transfers, scene, connector);

@@ -3,16 +3,19 @@
 /*
  * As it stands, this port compiles and is safe: it hears nothing, so the station stays in mode INIT and no connector
  * charges. Each function says what the board has to do. All of them run in the context that calls
- * taper_station_step(); none of them may block.
+ * taper_station_step() or taper_station_poll(); none of them may block.
  */
 
 /*
  * Fetch the oldest frame from the queue that the receive interrupt fills, from whichever bus it came.
  *
  * - `bus` counts from 0 in the order of the station's description. `length` is the DLC, as received.
+ * - `time_ms` is when the interrupt saw the frame, on the clock that taper_station_step() is called with. A board that does
+ *   not know leaves it alone: the frame then counts as received when it is taken.
  * - Skip remote frames, error frames and 29-bit identifiers here. Do not check contents: the station does.
  * - The queue should hold a control tick's worth: about 11 frames a second per connector, and room for a burst.
- *   When it is full, drop the oldest frame and count it: the newest state is what matters.
+ *   When it is full, drop the oldest frame and count it: the newest state is what matters. The count is what
+ *   receive_overflows() tells.
  */
 static bool receive(void *context, taper_frame_t *frame) {
     taper_template_board_t *board = context;
@@ -25,11 +28,10 @@ static bool receive(void *context, taper_frame_t *frame) {
  * Hand one frame to the CAN controller of `frame->bus`, or to a queue behind it that its interrupt empties.
  *
  * - Return false when it was not taken: queue full, bus-off, no such bus. The station counts that and sends the newest
- *   value again in its next tick; never wait, and never keep a frame that was refused.
+ *   value again in its next poll; never wait, and never keep a frame that was refused.
  * - Frames with the same identifier must leave in the order they came: the receiver checks a counter. Use one mailbox,
  *   or a FIFO; several mailboxes with the same priority may swap two frames.
- * - After bus-off, restart the controller after 1, 2, 4 .. 60 s, and throw away what was queued: an old setpoint must
- *   not leave late.
+ * - Keep the queue short, some 30 frames: an old setpoint must not leave late. At bus-off, throw away what is queued.
  */
 static bool send(void *context, const taper_frame_t *frame) {
     taper_template_board_t *board = context;
@@ -54,13 +56,64 @@ static uint32_t clock_us(void *context) {
     return 0;
 }
 
+/* Whether the CAN controller of `bus` is bus-off. The station then stops sending and decides when to try again. */
+static bool bus_is_off(void *context, uint8_t bus) {
+    taper_template_board_t *board = context;
+    (void)board;
+    (void)bus;
+    return false;
+}
+
+/* Bring that controller back: on an FDCAN or FlexCAN, leave its init or freeze mode. It needs 128 times eleven recessive
+   bits then; do not wait for them. Switch automatic recovery off, or the station's pauses have no effect. */
+static void restart_bus(void *context, uint8_t bus) {
+    taper_template_board_t *board = context;
+    (void)board;
+    (void)bus;
+}
+
+/* Frames that the receive queue, or the controller's FIFO, has lost so far. */
+static uint32_t receive_overflows(void *context) {
+    taper_template_board_t *board = context;
+    (void)board;
+    return 0;
+}
+
+/*
+ * Copy `copy` (0 or 1) of the station's record in non-volatile memory, `length` bytes as they are: two flash sectors, or
+ * two areas of an EEPROM or FRAM. The record has its own sequence number and CRC-32, so a write that power-off cuts short
+ * may leave that copy torn; it must not harm the other. The station writes seldom, at most every ten seconds.
+ */
+static bool store_read(void *context, unsigned copy, void *data, uint32_t length) {
+    taper_template_board_t *board = context;
+    (void)board;
+    (void)copy;
+    (void)data;
+    (void)length;
+    return false; /* never written */
+}
+
+static bool store_write(void *context, unsigned copy, const void *data, uint32_t length) {
+    taper_template_board_t *board = context;
+    (void)board;
+    (void)copy;
+    (void)data;
+    (void)length;
+    return false; /* not written */
+}
+
 taper_port_t taper_template_port(taper_template_board_t *board) {
     const taper_port_t port = {
         .context = board,
         .receive = receive,
         .send = send,
-        .kick_watchdog = kick_watchdog, /* NULL for a board without a watchdog */
-        .clock_us = clock_us,           /* NULL for a board without a fast clock */
+        .kick_watchdog = kick_watchdog,         /* NULL for a board without a watchdog */
+        .clock_us = clock_us,                   /* NULL for a board without a fast clock */
+        .bus_is_off = bus_is_off,               /* NULL where it cannot be told */
+        .restart_bus = restart_bus,             /* NULL where the controller comes back by itself */
+        .receive_overflows = receive_overflows, /* NULL where it is not counted */
+        .store_read = store_read,               /* both NULL for a board without a store */
+        .store_write = store_write,
     };
     return port;
 }

@@ -99,8 +99,9 @@ static void begin_stay(taper_session_t *session, uint32_t now_ms) {
 /* minimum <= target <= maximum, where they were told. Planning moves the target; people should know why. */
 static bool parameters_contradict(const taper_ev_params_t *p) {
     const int32_t target_Wh = p->c.target_Wh;
-    const bool energy = target_Wh != TAPER_ABSENT && (target_Wh < p->c.minimum_Wh || (p->c.maximum_Wh != TAPER_ABSENT &&
-                                                                                       target_Wh > p->c.maximum_Wh));
+    const bool energy =
+        target_Wh != TAPER_ABSENT &&
+        (target_Wh < p->c.minimum_Wh || (p->c.maximum_Wh != TAPER_ABSENT && target_Wh > p->c.maximum_Wh));
     const bool bounds = p->c.maximum_Wh != TAPER_ABSENT && p->c.minimum_Wh > p->c.maximum_Wh;
     const bool soc = p->a.soc_target_permille != TAPER_ABSENT &&
                      p->a.soc_target_permille < p->a.soc_minimum_permille; /* absent is below any other */
@@ -205,7 +206,8 @@ static void apply_parameters(taper_session_table_t *table, taper_session_t *sess
 }
 
 /* What a connector says of itself; news only when it changes. */
-static void apply_info(taper_session_table_t *table, taper_session_t *session, const taper_evse_info_t *info) {
+static void apply_info(taper_session_table_t *table, taper_session_t *session,
+                       const taper_evse_info_t *info) {
     const bool first = !session->info_known;
     const taper_evse_info_t old = session->info;
     session->info = *info;
@@ -223,7 +225,8 @@ uint32_t taper_session_unix_s(const taper_session_table_t *table, uint32_t now_m
     if (!table->clock_heard.heard) {
         return 0;
     }
-    const uint64_t world_ms = (uint64_t)taper_elapsed_ms(now_ms, table->clock_heard.at_ms) * table->time_scale;
+    const uint64_t world_ms =
+        (uint64_t)taper_elapsed_ms(now_ms, table->clock_heard.at_ms) * table->time_scale;
     return table->unix_s + (uint32_t)(world_ms / 1000u);
 }
 

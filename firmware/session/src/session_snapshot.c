@@ -11,7 +11,8 @@ static int32_t round_down_to_step(int32_t current_mA) {
 }
 
 bool taper_session_is_online(const taper_session_table_t *table, uint8_t connector, uint32_t now_ms) {
-    return taper_session_is_fresh(table->session[connector].status_heard, now_ms, TAPER_EVSE_STATUS_TIMEOUT_ms);
+    return taper_session_is_fresh(table->session[connector].status_heard, now_ms,
+                                  TAPER_EVSE_STATUS_TIMEOUT_ms);
 }
 
 /* PLANNED: nothing speaks against charging. The first that applies, from the connector to the vehicle. */
@@ -56,7 +57,8 @@ static int32_t min_current_mA(const taper_connector_config_t *connector, const t
 }
 
 /* Booked by the higher of nominal and measured voltage: too little power offered rather than too much drawn. */
-static int32_t volts(const taper_connector_config_t *connector, const taper_session_t *session, uint32_t now_ms) {
+static int32_t volts(const taper_connector_config_t *connector, const taper_session_t *session,
+                     uint32_t now_ms) {
     int32_t voltage_mV = connector->voltage_mV;
     if (taper_session_is_fresh(session->elec_heard, now_ms, TAPER_EVSE_ELEC_TIMEOUT_ms)) {
         voltage_mV = taper_max_i32(voltage_mV, session->elec.voltage_mV); /* absent is below any other */
@@ -129,8 +131,9 @@ static int32_t departs_in_s(const taper_session_table_t *table, const taper_sess
                             uint32_t now_ms) {
     const int32_t departure_min = session->used.b.departure_min;
     if (!table->clock_heard.heard || departure_min == TAPER_ABSENT) {
-        const uint64_t here_ms = (uint64_t)taper_elapsed_ms(now_ms, session->plugged_in_ms) * table->time_scale;
-        return taper_saturate_i32(TAPER_DEFAULT_STAY_s - (int64_t)(here_ms / 1000u));
+        const uint64_t here_ms =
+            (uint64_t)taper_elapsed_ms(now_ms, session->plugged_in_ms) * table->time_scale;
+        return taper_saturate_i32((int64_t)TAPER_DEFAULT_STAY_s - (int64_t)(here_ms / 1000u));
     }
     return departure_in_s(departure_min, taper_session_unix_s(table, now_ms));
 }
@@ -177,7 +180,8 @@ bool taper_session_demand(const taper_session_table_t *table, uint8_t connector,
     return true;
 }
 
-taper_reason_t taper_session_idle_reason(const taper_session_table_t *table, uint8_t connector, uint32_t now_ms) {
+taper_reason_t taper_session_idle_reason(const taper_session_table_t *table, uint8_t connector,
+                                         uint32_t now_ms) {
     const taper_reason_t reason = obstacle(table, connector, now_ms);
     if (reason != TAPER_REASON_PLANNED) {
         return reason;
@@ -187,7 +191,8 @@ taper_reason_t taper_session_idle_reason(const taper_session_table_t *table, uin
         return TAPER_REASON_COMPLETE;
     }
     const taper_connector_config_t *config = &table->config->connectors[connector];
-    const bool fits = max_current_mA(config, session, now_ms) >= taper_max_i32(min_current_mA(config, session), 1);
+    const bool fits =
+        max_current_mA(config, session, now_ms) >= taper_max_i32(min_current_mA(config, session), 1);
     return fits ? TAPER_REASON_PLANNED : TAPER_REASON_VEHICLE_LIMIT;
 }
 

@@ -72,9 +72,8 @@ void taper_limits_apply_meter(taper_limits_t *limits, const taper_site_meter_t *
     int64_t sum_W = 0;
     for (unsigned phase = 0; phase < 3; phase++) {
         const int32_t current_mA = message->other_mA[phase];
-        sum_W += current_mA == TAPER_ABSENT
-                     ? limits->config->other_load_W / 3
-                     : (int64_t)current_mA * limits->config->site_voltage_mV / 1000000;
+        sum_W += current_mA == TAPER_ABSENT ? limits->config->other_load_W / 3
+                                            : (int64_t)current_mA * limits->config->site_voltage_mV / 1000000;
     }
     if (limits->meter_heard && !limits->meter_alive) {
         taper_event_note(limits->log, TAPER_EVENT_METER_BACK, 0, TAPER_NODE_GATEWAY, 0);
@@ -134,7 +133,8 @@ static void expire(taper_limits_t *limits, uint32_t now_ms) {
         taper_event_note(limits->log, TAPER_EVENT_GATEWAY_LOST, 0, TAPER_NODE_GATEWAY, limits->failsafe_W);
     }
     if (meter_was_alive && !limits->meter_alive) {
-        taper_event_note(limits->log, TAPER_EVENT_METER_LOST, 0, TAPER_NODE_GATEWAY, limits->config->other_load_W);
+        taper_event_note(limits->log, TAPER_EVENT_METER_LOST, 0, TAPER_NODE_GATEWAY,
+                         limits->config->other_load_W);
     }
 }
 
@@ -160,7 +160,8 @@ static taper_limit_now_t supply(const taper_limits_t *limits, uint32_t now_ms) {
     const int32_t built_W = limits->config->groups[0].limit_W;
     const int32_t known_W = curve_W(limits, point_at(&limits->curve, world_ms(limits, now_ms)));
     if (!taper_limits_gateway_alive(limits, now_ms)) {
-        return (taper_limit_now_t){.site_W = taper_min_i32(known_W, limits->failsafe_W), .source = TAPER_LIMIT_FAILSAFE};
+        return (taper_limit_now_t){.site_W = taper_min_i32(known_W, limits->failsafe_W),
+                                   .source = TAPER_LIMIT_FAILSAFE};
     }
     if (limits->gateway_W < known_W) {
         return (taper_limit_now_t){.site_W = limits->gateway_W, .source = TAPER_LIMIT_GATEWAY};

@@ -23,18 +23,18 @@ static const taper_connector_config_t connectors[] = {CONNECTOR(0, 1, 6000), CON
 static const taper_connector_config_t continuous_connectors[] = {CONNECTOR(0, 1, 0), CONNECTOR(1, 1, 0),
                                                                  CONNECTOR(2, 2, 0), CONNECTOR(3, 2, 0)};
 
-#define STATION(table)      \
-    {.name = "scene",       \
-     .connectors = (table), \
-     .groups = groups,      \
-     .failsafe_W = 4000,    \
+#define STATION(table)          \
+    {.name = "scene",           \
+     .connectors = (table),     \
+     .groups = groups,          \
+     .failsafe_W = 4000,        \
      .site_voltage_mV = 230000, \
-     .tick_ms = 1000,       \
-     .min_on_ms = 300000,   \
-     .min_off_ms = 300000,  \
-     .step_s = 900,         \
-     .steps = 24,           \
-     .connector_count = 4,  \
+     .tick_ms = 1000,           \
+     .min_on_ms = 300000,       \
+     .min_off_ms = 300000,      \
+     .step_s = 900,             \
+     .steps = 24,               \
+     .connector_count = 4,      \
      .group_count = 3}
 
 const taper_station_config_t *scene_four(void) {

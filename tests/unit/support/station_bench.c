@@ -58,12 +58,11 @@ void bench_send_clock(void) {
 
 void bench_send_status(uint8_t node, bool present) {
     taper_message_t message = {.kind = TAPER_MESSAGE_EVSE_STATUS, .node = node};
-    message.as.evse_status = (taper_evse_status_t){
-        .pilot = present ? TAPER_PILOT_C : TAPER_PILOT_A,
-        .ev_present = present,
-        .phases = 3,
-        .fallback_active = !bench.heard[node],
-        .setpoint_echo = bench.echo[node]};
+    message.as.evse_status = (taper_evse_status_t){.pilot = present ? TAPER_PILOT_C : TAPER_PILOT_A,
+                                                   .ev_present = present,
+                                                   .phases = 3,
+                                                   .fallback_active = !bench.heard[node],
+                                                   .setpoint_echo = bench.echo[node]};
     bench_send(&message);
 }
 

@@ -11,11 +11,11 @@ typedef struct {
     taper_port_t port;
     uint8_t counters[2048]; /**< end-to-end counter of every id that the world sends */
     uint32_t now_ms;
-    bool deaf;                        /**< nobody reads the bus; else it is read after every step and poll */
-    bool heard[TAPER_NODES_PER_BUS + 1];               /**< a SETPOINT came since bench_start(), by node */
+    bool deaf; /**< nobody reads the bus; else it is read after every step and poll */
+    bool heard[TAPER_NODES_PER_BUS + 1];                /**< a SETPOINT came since bench_start(), by node */
     taper_setpoint_t setpoint[TAPER_NODES_PER_BUS + 1]; /**< the last one */
-    uint8_t echo[TAPER_NODES_PER_BUS + 1];              /**< its counter: what the connector's status echoes */
-    uint32_t setpoints;               /**< heard since bench_start() */
+    uint8_t echo[TAPER_NODES_PER_BUS + 1]; /**< its counter: what the connector's status echoes */
+    uint32_t setpoints;                    /**< heard since bench_start() */
 } station_bench_t;
 
 extern station_bench_t bench;

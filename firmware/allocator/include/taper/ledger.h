@@ -23,7 +23,7 @@
 typedef struct {
     uint16_t sent_dA[TAPER_LEDGER_SETPOINTS]; /**< current by counter, in steps of the wire */
     uint32_t sent_ms[TAPER_LEDGER_SETPOINTS];
-    uint16_t open; /**< bit c: the setpoint with counter c may be in force, now or later */
+    uint16_t open;             /**< bit c: the setpoint with counter c may be in force, now or later */
     int32_t unknown_mA;        /**< what a controller before this one may have told it; 0: nothing any more */
     uint32_t unknown_until_ms; /**< end of that */
     uint8_t first_echo;        /**< + 1; may still be of that time. 0: none heard */
@@ -50,7 +50,8 @@ void taper_ledger_sent(taper_ledger_t *ledger, uint8_t connector, uint8_t counte
                        uint32_t now_ms);
 
 /** What a connector reported at `at_ms` ends what it shows to be over. Cost: O(TAPER_LEDGER_SETPOINTS). */
-void taper_ledger_hear(taper_ledger_t *ledger, uint8_t connector, const taper_evse_status_t *status, uint32_t at_ms);
+void taper_ledger_hear(taper_ledger_t *ledger, uint8_t connector, const taper_evse_status_t *status,
+                       uint32_t at_ms);
 
 /** Close what ran out by `now_ms`. Call it once per tick and poll. Cost: O(connectors x TAPER_LEDGER_SETPOINTS). */
 void taper_ledger_update(taper_ledger_t *ledger, const taper_station_config_t *config, uint32_t now_ms);

@@ -29,8 +29,6 @@
 #include "taper/transfers.h"
 #include "taper/types.h"
 
-/** Periodic protected frames of a connector with a vehicle: EVSE_STATUS, EV_STATUS, EVSE_ELEC, EV_PARAM_A..D. */
-#define TAPER_FRAMES_PER_CONNECTOR 7
 /** All protected frames that a connector, or the gateway, can send: the number of end-to-end receivers. */
 #define TAPER_CONNECTOR_RECEIVERS 9
 #define TAPER_GATEWAY_RECEIVERS   4
@@ -67,36 +65,36 @@ typedef struct {
 
 /** The listener's state for one node. */
 typedef struct {
-    uint32_t tokens_x1000;     /**< frames that it may still send, in thousandths */
+    uint32_t tokens_x1000; /**< frames that it may still send, in thousandths */
     uint32_t refilled_ms;
-    uint32_t excess_ms;        /**< last frame above the rate */
-    uint32_t excess_since_ms;  /**< first one of this excess */
+    uint32_t excess_ms;       /**< last frame above the rate */
+    uint32_t excess_since_ms; /**< first one of this excess */
     bool in_excess, babbling;
-    bool known;                /**< heard before: the tokens count */
-    uint16_t emcy_code;        /**< its last EMCY, and when */
+    bool known;         /**< heard before: the tokens count */
+    uint16_t emcy_code; /**< its last EMCY, and when */
     uint32_t emcy_ms;
-    bool bad_field_noted;      /**< at `bad_field_ms`: the log is not for every frame */
+    bool bad_field_noted; /**< at `bad_field_ms`: the log is not for every frame */
     uint32_t bad_field_ms;
 } taper_node_guard_t;
 
 /** One CAN bus of the station, as a sender sees it. */
 typedef struct {
-    bool silent;              /**< nothing is sent until `retry_ms` */
-    bool in_trouble;          /**< nothing was taken since it was first left alone */
-    bool refusing;            /**< since `refusing_since_ms` nothing was taken */
+    bool silent;     /**< nothing is sent until `retry_ms` */
+    bool in_trouble; /**< nothing was taken since it was first left alone */
+    bool refusing;   /**< since `refusing_since_ms` nothing was taken */
     uint32_t refusing_since_ms;
     uint32_t retry_ms;
-    uint32_t back_ms;         /**< when it was last taken into use again */
-    uint8_t backoff_s;        /**< of the next pause */
+    uint32_t back_ms;  /**< when it was last taken into use again */
+    uint8_t backoff_s; /**< of the next pause */
 } taper_bus_guard_t;
 
 /** A lasting condition that EMCY tells. */
 typedef struct {
     uint8_t code; /**< taper_event_code_t; 0: free */
     uint8_t bus, node;
-    uint8_t sent;        /**< times, saturating */
-    uint32_t raised_ms;  /**< last time that it was seen */
-    uint32_t next_ms;    /**< of the next EMCY */
+    uint8_t sent;       /**< times, saturating */
+    uint32_t raised_ms; /**< last time that it was seen */
+    uint32_t next_ms;   /**< of the next EMCY */
 } taper_alarm_t;
 
 /** What survives a restart. Written whole, two copies in turn. */
@@ -104,7 +102,7 @@ typedef struct {
     uint32_t sequence;
     int32_t failsafe_W; /**< the gateway's last word on it */
     uint32_t starts;
-    uint32_t crc32;     /**< over the rest */
+    uint32_t crc32; /**< over the rest */
 } taper_station_record_t;
 
 typedef struct {
@@ -125,21 +123,23 @@ typedef struct {
     taper_bus_guard_t bus[TAPER_MAX_BUSES];
     taper_alarm_t alarm[TAPER_ALARMS];
     taper_station_record_t record;
-    uint8_t record_copy;    /**< the copy to write next */
-    uint32_t record_ms;     /**< of the last write */
-    bool rival_heard;       /**< a second controller speaks */
-    uint32_t rival_ms;      /**< when it was last heard */
-    bool started;           /**< there was a step or a poll: the ledger has begun */
+    uint8_t record_copy; /**< the copy to write next */
+    uint32_t record_ms;  /**< of the last write */
+    bool rival_heard;    /**< a second controller speaks */
+    uint32_t rival_ms;   /**< when it was last heard */
+    bool started;        /**< there was a step or a poll: the ledger has begun */
     bool stopped;
     uint8_t setpoint_counter[TAPER_MAX_CONNECTORS];
     uint8_t plan_counter[TAPER_MAX_CONNECTORS];
     uint8_t setpoint_session[TAPER_MAX_CONNECTORS]; /**< whom the setpoints were decided for */
-    bool setpoint_due[TAPER_MAX_CONNECTORS];        /**< decided, but not sent yet */
-    uint32_t setpoint_ms[TAPER_MAX_CONNECTORS];     /**< when one was last sent */
+    int32_t sent_mA[TAPER_MAX_CONNECTORS];          /**< what was last sent; negative: nothing that counts */
+    uint8_t sent_session[TAPER_MAX_CONNECTORS];     /**< and for whom */
+    uint32_t sent_ms[TAPER_MAX_CONNECTORS];         /**< and when */
+    bool status_due[TAPER_MAX_BUSES];               /**< the CTRL_STATUS of this tick is not out yet */
     uint8_t status_counter[TAPER_MAX_BUSES];
     uint8_t diag_counter[TAPER_MAX_BUSES];
     uint8_t emcy_counter[TAPER_MAX_BUSES];
-    uint32_t second_ms;     /**< when PLAN and CTRL_DIAG last went out */
+    uint32_t second_ms; /**< when PLAN and CTRL_DIAG last went out */
     uint8_t next_plan, next_diag;
     int32_t plan_W[TAPER_PLAN_STEPS][TAPER_MAX_CONNECTORS]; /**< first steps of the last finished plan */
     uint8_t plan_session[TAPER_MAX_CONNECTORS];             /**< whom it was made for */

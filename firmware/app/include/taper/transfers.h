@@ -67,9 +67,8 @@ typedef struct {
     uint8_t gateway_buffer[TAPER_TRANSFER_ENVELOPE + TAPER_MAX_LIMIT_POINTS * TAPER_CURVE_ITEM];
     uint8_t tool_buffer[16];
     uint8_t connector_buffer[TAPER_TRANSFER_ENVELOPE + TAPER_IDENTIFIER_LENGTH];
-    uint8_t connector_bus, connector_node; /**< whose transfer `connector` is in; node 0: nobody's yet */
-    uint8_t connector_index;
-    uint8_t turn; /**< link that is asked first for its next frame */
+    uint8_t connector_index; /**< who has, or had last, the link `connector`; connector_count: nobody yet */
+    uint8_t turn;            /**< link that is asked first for its next frame */
     uint8_t gateway_answer[16], connector_answer[16];
     uint8_t log[TAPER_TRANSFER_ENVELOPE +
                 TAPER_EVENTS * TAPER_LOG_ITEM]; /**< or the answer being sent to the tool */

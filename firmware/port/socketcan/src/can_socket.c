@@ -13,7 +13,7 @@
 
 /* What a frame costs in a socket's account (sk_buff and data; 64-bit kernels). */
 #define FRAME_COST 768
-/* A second of a full bus at 1 Mbit/s is 8000 frames; most kernels grant a process without root only 200 KB. */
+/* A second of a full bus at 1 Mbit/s is 8000 frames. Without CAP_NET_ADMIN most kernels grant 400 KB: 70 ms of that. */
 #define RECEIVE_BYTES (8000 * FRAME_COST)
 
 /* A kernel that refuses an option costs us what the option gives, and no more. */
@@ -33,7 +33,8 @@ int taper_can_socket_open(void) {
     }
     ask_for_number(fd, SOL_SOCKET, SO_TIMESTAMPNS, 1);
     ask_for_number(fd, SOL_SOCKET, SO_RXQ_OVFL, 1);
-    ask_for_number(fd, SOL_SOCKET, SO_RCVBUF, RECEIVE_BYTES / 2); /* the kernel doubles both */
+    ask_for_number(fd, SOL_SOCKET, SO_RCVBUF, RECEIVE_BYTES / 2); /* the kernel doubles all three */
+    ask_for_number(fd, SOL_SOCKET, SO_RCVBUFFORCE, RECEIVE_BYTES / 2);
     ask_for_number(fd, SOL_SOCKET, SO_SNDBUF, TAPER_SOCKETCAN_SEND_QUEUE * FRAME_COST / 2);
     return fd;
 }

@@ -55,6 +55,7 @@ bool taper_socketcan_open(taper_socketcan_t *can, const taper_socketcan_options_
     }
     can->bus_count = 0;
     can->head = can->tail = 0;
+    can->dry = false;
     can->now_ms = options->now_ms;
     can->clock_context = options->clock_context;
     can->filter_count = options->filter_count;
@@ -91,8 +92,11 @@ static void lose(const taper_socketcan_t *can, taper_socketcan_bus_t *bus) {
 
 /* The socket forgot its filters and what it was bound to if the interface was gone. */
 static void look_for(const taper_socketcan_t *can, taper_socketcan_bus_t *bus) {
+    if (!bus->down) { /* before the clock is asked: this is in the way of every frame */
+        return;
+    }
     const uint32_t now_ms = can->now_ms(can->clock_context);
-    if (!bus->down || (int32_t)(now_ms - bus->look_at_ms) < 0) {
+    if ((int32_t)(now_ms - bus->look_at_ms) < 0) {
         return;
     }
     bus->look_at_ms = now_ms + TAPER_SOCKETCAN_RETRY_MS;
@@ -201,10 +205,12 @@ void taper_socketcan_drain(taper_socketcan_t *can) {
 
 static bool port_receive(void *context, taper_frame_t *frame) {
     taper_socketcan_t *can = context;
-    if (can->head == can->tail) {
+    if (can->head == can->tail && !can->dry) {
         taper_socketcan_drain(can);
+        can->dry = true; /* who takes until there is nothing asks the kernel once, not twice */
     }
     if (can->head == can->tail) {
+        can->dry = false;
         return false;
     }
     *frame = can->queue[can->tail % TAPER_SOCKETCAN_QUEUE];

@@ -38,7 +38,7 @@
 /** What such a vehicle is offered at least, however full it is by our account [Wh]. */
 #define TAPER_OPEN_NEED_LEAST_Wh 1000
 /** Stay assumed for a vehicle that told no departure, or while the clock was never set [s]. */
-#define TAPER_DEFAULT_STAY_s (8 * 3600)
+#define TAPER_DEFAULT_STAY_s 28800
 /** A wall clock this far from where our own has got to was set: a jump, not drift [s]. */
 #define TAPER_CLOCK_JUMP_s 5
 
@@ -62,7 +62,7 @@ typedef struct {
     taper_evse_status_t status;
     taper_ev_status_t ev;
     taper_evse_elec_t elec;
-    taper_evse_info_t info;     /**< of the connector, whichever vehicle is there */
+    taper_evse_info_t info; /**< of the connector, whichever vehicle is there */
     bool info_known;
     taper_ev_params_t received; /**< newest of each frame; they may disagree */
     taper_ev_params_t used;     /**< last set that agreed; `d.taper_W` is absent unless D agreed as well */
@@ -121,7 +121,8 @@ void taper_session_update(taper_session_table_t *table, uint32_t now_ms);
 void taper_session_snapshot(const taper_session_table_t *table, uint32_t now_ms, taper_snapshot_t *snapshot);
 
 /** Why a connector without an active demand has none: TAPER_REASON_PLANNED for one that has. Cost: constant. */
-taper_reason_t taper_session_idle_reason(const taper_session_table_t *table, uint8_t connector, uint32_t now_ms);
+taper_reason_t taper_session_idle_reason(const taper_session_table_t *table, uint8_t connector,
+                                         uint32_t now_ms);
 
 /** Whether the heartbeat of a connector is there. */
 bool taper_session_is_online(const taper_session_table_t *table, uint8_t connector, uint32_t now_ms);

@@ -26,23 +26,23 @@ typedef struct {
     taper_event_log_t *log; /**< NULL: none */
     uint32_t time_scale;    /**< world seconds per second of the bus; 1 on a real station */
     taper_limit_curve_t curve;
-    bool heard;                  /**< any SITE_LIMIT with a limit, ever */
-    bool alive;                  /**< the last one still holds, by the last update */
-    uint32_t heard_ms;           /**< when the last one came */
-    uint32_t holds_ms;           /**< how long it holds */
-    bool beating;                /**< a heartbeat of any kind is fresh, by the last update */
-    uint32_t beat_ms;            /**< the last one */
-    uint32_t beating_since_ms;   /**< without a pause, and without a limit */
-    int32_t gateway_W;           /**< what it said, >= 0; INT32_MAX: no limit in force */
-    int32_t failsafe_W;          /**< >= 0 */
+    bool heard;                /**< any SITE_LIMIT with a limit, ever */
+    bool alive;                /**< the last one still holds, by the last update */
+    uint32_t heard_ms;         /**< when the last one came */
+    uint32_t holds_ms;         /**< how long it holds */
+    bool beating;              /**< a heartbeat of any kind is fresh, by the last update */
+    uint32_t beat_ms;          /**< the last one */
+    uint32_t beating_since_ms; /**< without a pause, and without a limit */
+    int32_t gateway_W;         /**< what it said, >= 0; INT32_MAX: no limit in force */
+    int32_t failsafe_W;        /**< >= 0 */
     bool meter_heard, meter_alive;
-    uint32_t meter_ms;           /**< when the last SITE_METER came */
-    int32_t metered_W;           /**< what it said, >= 0 */
-    uint32_t negative;           /**< limits below zero, taken as zero */
+    uint32_t meter_ms; /**< when the last SITE_METER came */
+    int32_t metered_W; /**< what it said, >= 0 */
+    uint32_t negative; /**< limits below zero, taken as zero */
 } taper_limits_t;
 
 typedef struct {
-    int32_t site_W; /**< for charging, >= 0 */
+    int32_t site_W;  /**< for charging, >= 0 */
     int32_t other_W; /**< taken off for what else the site draws */
     taper_limit_source_t source;
 } taper_limit_now_t;

@@ -24,14 +24,15 @@ typedef struct {
 
 typedef struct {
     taper_event_t event[TAPER_EVENTS];
-    uint32_t count;  /**< ever noted; the last min(count, TAPER_EVENTS) are in the ring, at index % TAPER_EVENTS */
+    uint32_t
+        count; /**< ever noted; the last min(count, TAPER_EVENTS) are in the ring, at index % TAPER_EVENTS */
     uint32_t now_ms; /**< time of what is noted next */
     uint32_t unix_s;
 } taper_event_log_t;
 
 /** Note an event. Cost: constant. A NULL log keeps nothing. */
-static inline void taper_event_note(taper_event_log_t *log, taper_event_code_t code, uint8_t bus, uint8_t node,
-                                    int32_t data) {
+static inline void taper_event_note(taper_event_log_t *log, taper_event_code_t code, uint8_t bus,
+                                    uint8_t node, int32_t data) {
     if (log != 0) {
         log->event[log->count % TAPER_EVENTS] = (taper_event_t){.time_ms = log->now_ms,
                                                                 .unix_s = log->unix_s,

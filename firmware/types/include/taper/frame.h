@@ -12,7 +12,8 @@ typedef struct {
     uint8_t bus;    /**< which of the station's CAN buses */
     uint8_t length; /**< data length code, 0..8 */
     uint8_t data[TAPER_FRAME_LENGTH];
-    uint32_t time_ms; /**< when the port received it, on the station's clock; of no meaning in a frame to send */
+    uint32_t
+        time_ms; /**< when the port received it, on the station's clock; of no meaning in a frame to send */
 } taper_frame_t;
 
 #endif

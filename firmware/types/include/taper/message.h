@@ -118,10 +118,11 @@ typedef struct {
 typedef struct {
     uint8_t severity; /**< taper_severity_t */
     uint16_t code;    /**< taper_event_code_t of the station; other nodes may use their own */
-    uint8_t reaction; /**< of the sender: 0 none, 1 its frames are dropped, 2 no current for `about`, 3 for nobody */
-    uint8_t session;  /**< 0: none */
-    uint8_t about;    /**< node that it is about; 0: the sender or the station */
-    uint8_t data;     /**< depends on the code */
+    uint8_t
+        reaction; /**< of the sender: 0 none, 1 its frames are dropped, 2 no current for `about`, 3 for nobody */
+    uint8_t session; /**< 0: none */
+    uint8_t about;   /**< node that it is about; 0: the sender or the station */
+    uint8_t data;    /**< depends on the code */
 } taper_emcy_t;
 
 /** SITE_METER, gateway to controller, 1 s: what else the site draws; negative: it feeds in. */

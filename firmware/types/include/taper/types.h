@@ -102,32 +102,32 @@ typedef struct {
     const taper_connector_config_t *connectors; /**< [connector_count] */
     const taper_group_config_t *groups;         /**< [group_count] */
     int32_t failsafe_W;                         /**< site limit while the gateway is silent */
-    int32_t other_load_W;                       /**< most that the site draws besides: assumed while its meter is silent */
-    int32_t site_voltage_mV;                    /**< phase to neutral, turns the meter's currents into power */
-    uint32_t tick_ms;                           /**< control tick */
-    uint32_t min_on_ms;                         /**< a connector that was switched on stays on this long */
-    uint32_t min_off_ms; /**< and off this long, for the contactor's and vehicle's sake */
-    uint16_t step_s;     /**< length of a planning step */
-    uint8_t steps;       /**< planning steps, the horizon */
+    int32_t other_load_W;    /**< most that the site draws besides: assumed while its meter is silent */
+    int32_t site_voltage_mV; /**< phase to neutral, turns the meter's currents into power */
+    uint32_t tick_ms;        /**< control tick */
+    uint32_t min_on_ms;      /**< a connector that was switched on stays on this long */
+    uint32_t min_off_ms;     /**< and off this long, for the contactor's and vehicle's sake */
+    uint16_t step_s;         /**< length of a planning step */
+    uint8_t steps;           /**< planning steps, the horizon */
     uint8_t connector_count;
     uint8_t group_count;
 } taper_station_config_t;
 
 /** One vehicle's demand at the instant of a snapshot. Meaningless unless `active`. */
 typedef struct {
-    bool active;          /**< a vehicle is there, is sound, and still wants energy */
-    bool soc_estimated;   /**< `stored_Wh` rests on measured energy because the reported SOC is stale */
-    uint8_t session;      /**< wire number of the session on this connector */
-    int32_t stored_Wh;    /**< energy in the battery, >= 0; 0 if SOC or capacity is unknown */
-    int32_t capacity_Wh;  /**< > 0, or 0: unknown (no taper then) */
-    int32_t need_Wh;      /**< energy still wanted, > 0 */
-    int32_t peak_W;       /**< what the vehicle takes at SOC 0, >= 0 */
-    int32_t taper_W;      /**< fall of that from SOC 0 to SOC 1, 0..peak_W */
-    int32_t max_mA;       /**< least of connector and vehicle limit, per phase */
-    int32_t min_mA;       /**< greatest of connector and vehicle minimum */
-    int32_t W_per_A;      /**< power of 1 A on each phase in use, > 0 */
+    bool active;            /**< a vehicle is there, is sound, and still wants energy */
+    bool soc_estimated;     /**< `stored_Wh` rests on measured energy because the reported SOC is stale */
+    uint8_t session;        /**< wire number of the session on this connector */
+    int32_t stored_Wh;      /**< energy in the battery, >= 0; 0 if SOC or capacity is unknown */
+    int32_t capacity_Wh;    /**< > 0, or 0: unknown (no taper then) */
+    int32_t need_Wh;        /**< energy still wanted, > 0 */
+    int32_t peak_W;         /**< what the vehicle takes at SOC 0, >= 0 */
+    int32_t taper_W;        /**< fall of that from SOC 0 to SOC 1, 0..peak_W */
+    int32_t max_mA;         /**< least of connector and vehicle limit, per phase */
+    int32_t min_mA;         /**< greatest of connector and vehicle minimum */
+    int32_t W_per_A;        /**< power of 1 A on each phase in use, > 0 */
     int32_t booked_W_per_A; /**< counts against limits; more than W_per_A while its phases are not known */
-    int32_t departs_in_s; /**< time to the departure that the vehicle told; <= 0: it has passed */
+    int32_t departs_in_s;   /**< time to the departure that the vehicle told; <= 0: it has passed */
 } taper_demand_t;
 
 /** What connector and vehicle allow, whatever the battery takes [W]. */

@@ -1,0 +1,56 @@
+/* A node that babbles (docs/protocol.md, fault 16), when the port's times are not in order. */
+#include <string.h>
+
+#include "station_bench.h"
+#include "unity.h"
+
+#define NODE         3
+#define STATUS_CYCLE 200u
+
+void setUp(void) {
+    const taper_station_options_t options = bench_options();
+    bench_start(&options);
+    bench_send_all(NODE, 50000);
+    bench_step();
+}
+
+void tearDown(void) {}
+
+/** Ten frames in every 10 ms, whose times go back by a millisecond each, for `seconds`. */
+static void babble(unsigned seconds) {
+    const uint32_t end_ms = bench.now_ms + seconds * 1000u;
+    while (bench.now_ms < end_ms) {
+        const uint32_t now_ms = bench.now_ms;
+        for (unsigned k = 0; k < 10; k++) {
+            bench.now_ms = now_ms - k;
+            bench_send_status(NODE, true);
+        }
+        bench.now_ms = now_ms;
+        bench_poll(10);
+    }
+}
+
+static void test_times_that_go_back_do_not_hide_a_node_that_babbles(void) {
+    babble(2);
+    TEST_ASSERT_EQUAL(1, bench_events(TAPER_EVENT_BABBLING));
+    TEST_ASSERT_GREATER_THAN(1800, taper_station_counter(&bench.station, TAPER_COUNTER_FRAMES_BABBLED));
+}
+
+static void test_times_that_go_back_do_not_make_a_node_babble(void) {
+    for (unsigned k = 0; k < 50; k++) {
+        bench.now_ms += STATUS_CYCLE - 1;
+        bench_send_status(NODE, true);
+        bench.now_ms -= 1;
+        bench_send_vehicle(NODE, 7, 500);
+        bench_poll(1);
+    }
+    TEST_ASSERT_EQUAL(0, bench_events(TAPER_EVENT_BABBLING));
+    TEST_ASSERT_EQUAL(0, taper_station_counter(&bench.station, TAPER_COUNTER_FRAMES_BABBLED));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_times_that_go_back_do_not_hide_a_node_that_babbles);
+    RUN_TEST(test_times_that_go_back_do_not_make_a_node_babble);
+    return UNITY_END();
+}
