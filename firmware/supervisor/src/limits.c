@@ -52,6 +52,7 @@ void taper_limits_apply(taper_limits_t *limits, const taper_site_limit_t *messag
     beat(limits, at_ms);
     if (message->failsafe_W != TAPER_ABSENT) {
         limits->failsafe_W = taper_clamp_i32(message->failsafe_W, 0, limits->config->groups[0].limit_W);
+        limits->failsafe_told = true;
     }
     if (message->active && message->limit_W == TAPER_ABSENT) {
         apply_heartbeat(limits, at_ms);

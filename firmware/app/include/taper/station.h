@@ -100,7 +100,7 @@ typedef struct {
 /** What survives a restart. Written whole, two copies in turn. */
 typedef struct {
     uint32_t sequence;
-    int32_t failsafe_W; /**< the gateway's last word on it */
+    int32_t failsafe_W; /**< the gateway's last word on it, or absent: the description's holds */
     uint32_t starts;
     uint32_t crc32; /**< over the rest */
 } taper_station_record_t;
