@@ -40,6 +40,7 @@ typedef struct {
     uint32_t meter_ms; /**< when the last SITE_METER came */
     int32_t metered_W; /**< what it said, >= 0 */
     uint32_t negative; /**< limits below zero, taken as zero */
+    bool is_negative;  /**< the last one was */
 } taper_limits_t;
 
 typedef struct {
