@@ -226,7 +226,7 @@ static void take_report(taper_station_t *station, taper_frame_t *frame) {
         taper_station_count(station, TAPER_COUNTER_FRAMES_UNKNOWN);
         return;
     }
-    frame->time_ms = taper_node_guard_time(sender.guard, frame->time_ms);
+    frame->time_ms = taper_node_guard_time(sender.guard, frame->time_ms, station->events.now_ms);
     const uint32_t most_per_second = TOO_MUCH * (sender.connector < 0 ? GATEWAY_NOMINAL : CONNECTOR_NOMINAL);
     if (!taper_node_guard_passes(station, sender.guard, most_per_second, frame) ||
         !is_good(station, sender.receiver, frame)) {
