@@ -40,7 +40,7 @@ taper_event_kind_t taper_event_kind(uint8_t code) {
         KIND(EMCY_HEARD, WARNING, "code");
         KIND(LIMIT_NEGATIVE, WARNING, NULL);
         KIND(GUARD, ERROR, NULL);
-        KIND(IDENTIFIED, INFO, "length");
+        KIND(IDENTIFIED, INFO, NULL);
     }
     return (taper_event_kind_t){NULL, TAPER_LOG_WARNING, "data"};
 }

@@ -110,6 +110,59 @@ static void test_a_plan_ends_after_two_steps_without_a_renewal(void) {
     TEST_ASSERT_EQUAL(TAPER_MODE_FALLBACK, taper_station_mode(&bench.station));
 }
 
+/** Vehicle 1 says the greatest that the wire carries of everything; the next set is used whole. */
+static void send_extreme_parameters(void) {
+    taper_message_t message = {.kind = TAPER_MESSAGE_EV_PARAM_A, .node = 1};
+    message.as.ev_param_a = (taper_ev_param_a_t){.revision = 9,
+                                                 .session = 7,
+                                                 .capacity_Wh = 2000000,
+                                                 .soc_target_permille = 1000,
+                                                 .soc_minimum_permille = TAPER_ABSENT,
+                                                 .soc_plug_in_permille = TAPER_ABSENT};
+    bench_send(&message);
+    message = (taper_message_t){.kind = TAPER_MESSAGE_EV_PARAM_B, .node = 1};
+    message.as.ev_param_b = (taper_ev_param_b_t){
+        .revision = 9, .session = 7, .departure_min = 65534, .peak_W = 655340, .min_mA = TAPER_ABSENT};
+    bench_send(&message);
+    message = (taper_message_t){.kind = TAPER_MESSAGE_EV_PARAM_C, .node = 1};
+    message.as.ev_param_c = (taper_ev_param_c_t){
+        .revision = 9, .target_Wh = 655340, .maximum_Wh = TAPER_ABSENT, .minimum_Wh = TAPER_ABSENT};
+    bench_send(&message);
+    message = (taper_message_t){.kind = TAPER_MESSAGE_EV_PARAM_D, .node = 1};
+    message.as.ev_param_d = (taper_ev_param_d_t){.revision = 9, .session = 7, .taper_W = 655340};
+    bench_send(&message);
+}
+
+static void test_row_5_the_greatest_values_of_the_wire_do_not_spoil_the_plan(void) {
+    bench_send_all(3, 50000);
+    bench_step();
+    bench_send_all(3, 50000);
+    send_extreme_parameters();
+    bench_step();
+    TEST_ASSERT_EQUAL_INT32(2000000, bench.station.snapshot.demand[0].capacity_Wh);
+    for (uint8_t i = 0; i < 3; i++) {
+        TEST_ASSERT_TRUE(bench.station.plan_W[0][i] >= 0 && bench.station.plan_W[0][i] <= 22080);
+    }
+    TEST_ASSERT_INT32_WITHIN(80, 8000, bench.station.plan_W[0][1]); /* the others, as planned without it */
+    TEST_ASSERT_EQUAL_UINT32(0, taper_station_counter(&bench.station, TAPER_COUNTER_PLANS_REJECTED));
+    TEST_ASSERT_EQUAL_UINT32(0, taper_station_counter(&bench.station, TAPER_COUNTER_GUARD_VIOLATIONS));
+}
+
+static void test_row_26_a_clock_that_was_set_makes_the_planner_think_again(void) {
+    taper_message_t message = {.kind = TAPER_MESSAGE_TIME_SYNC, .node = TAPER_NODE_GATEWAY};
+    bench_send_all(1, 50000);
+    bench_step();
+    bench_send_all(1, 50000);
+    bench_step();
+    TEST_ASSERT_EQUAL_UINT32(1, taper_station_counter(&bench.station, TAPER_COUNTER_PLANS));
+    bench_send_all(1, 50000);
+    message.as.time_sync = (taper_time_sync_t){.unix_s = 600000 + bench.now_ms / 1000 + 3600, .quality = 1};
+    bench_send(&message);
+    bench_step();
+    TEST_ASSERT_EQUAL_UINT32(2, taper_station_counter(&bench.station, TAPER_COUNTER_PLANS));
+    TEST_ASSERT_EQUAL(TAPER_MODE_PLAN, taper_station_mode(&bench.station));
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_a_soc_frame_in_gives_a_setpoint_frame_out_through_every_hop);
@@ -117,5 +170,7 @@ int main(void) {
     RUN_TEST(test_while_a_renewal_is_in_work_the_plan_is_followed);
     RUN_TEST(test_a_poisoned_solver_means_fallback_in_the_same_tick_and_a_new_try_after_a_minute);
     RUN_TEST(test_a_plan_ends_after_two_steps_without_a_renewal);
+    RUN_TEST(test_row_5_the_greatest_values_of_the_wire_do_not_spoil_the_plan);
+    RUN_TEST(test_row_26_a_clock_that_was_set_makes_the_planner_think_again);
     return UNITY_END();
 }

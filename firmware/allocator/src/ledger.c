@@ -2,8 +2,8 @@
 
 #include <string.h>
 
-/** A report tells nothing of setpoints that may have crossed it on the way [ms]. */
-#define CROSSING_ms 500u
+/** A report tells nothing of setpoints that may have crossed it on the way: both may have waited as long [ms]. */
+#define CROSSING_ms (2u * TAPER_LEDGER_LATE_ms)
 
 void taper_ledger_init(taper_ledger_t *ledger, const taper_station_config_t *config, uint32_t validity_ms,
                        uint32_t now_ms) {

@@ -1,6 +1,4 @@
 /* Frames in: who sent them, whether to believe them, and where they go. */
-#include <string.h>
-
 #include "station_internal.h"
 #include "taper/codec.h"
 
@@ -184,9 +182,9 @@ static void set_curve(taper_station_t *station) {
 }
 
 static void note_identifier(taper_station_t *station, const taper_frame_t *frame, uint8_t connector) {
-    const size_t length = strlen(taper_transfers_identifier(&station->transfers, connector));
+    const bool known = taper_transfers_identifier(&station->transfers, connector)[0] != '\0';
     taper_event_note(&station->events, TAPER_EVENT_IDENTIFIED, frame->bus, (uint8_t)(frame->id & 0x3Fu),
-                     (int32_t)length);
+                     known);
 }
 
 static void take_transfer(taper_station_t *station, const taper_frame_t *frame) {

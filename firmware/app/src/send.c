@@ -117,7 +117,8 @@ void taper_station_send_status(taper_station_t *station, uint32_t now_ms) {
     for (message.bus = 0; message.bus < buses; message.bus++) {
         const bool due = station->status_due[message.bus];
         station->status_due[message.bus] =
-            due && !taper_station_send_message(station, &message, &station->status_counter[message.bus], now_ms);
+            due &&
+            !taper_station_send_message(station, &message, &station->status_counter[message.bus], now_ms);
     }
 }
 
@@ -152,7 +153,7 @@ void taper_station_send_display(taper_station_t *station, uint32_t now_ms) {
         return;
     }
     station->second_ms = now_ms;
-    for (uint8_t k = 0; k < (connectors + PLAN_ROUND_s - 1u) / PLAN_ROUND_s; k++) {
+    for (unsigned k = 0; k < (connectors + PLAN_ROUND_s - 1u) / PLAN_ROUND_s; k++) {
         send_plan(station, station->next_plan, now_ms);
         station->next_plan = (uint8_t)((station->next_plan + 1) % connectors);
     }

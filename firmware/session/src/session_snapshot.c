@@ -133,7 +133,7 @@ static int32_t departs_in_s(const taper_session_table_t *table, const taper_sess
     if (!table->clock_heard.heard || departure_min == TAPER_ABSENT) {
         const uint64_t here_ms =
             (uint64_t)taper_elapsed_ms(now_ms, session->plugged_in_ms) * table->time_scale;
-        return taper_saturate_i32(TAPER_DEFAULT_STAY_s - (int64_t)(here_ms / 1000u));
+        return taper_saturate_i32((int64_t)TAPER_DEFAULT_STAY_s - (int64_t)(here_ms / 1000u));
     }
     return departure_in_s(departure_min, taper_session_unix_s(table, now_ms));
 }

@@ -16,7 +16,7 @@
 
 /** Counters of SETPOINT, and so setpoints that the echo can tell apart. */
 #define TAPER_LEDGER_SETPOINTS 16u
-/** A setpoint may have waited in a send queue: its validity is taken to begin this much later [ms]. */
+/** A frame may have waited so long in a send queue: the validity of a setpoint is taken to begin this much later [ms]. */
 #define TAPER_LEDGER_LATE_ms 500u
 
 /** One connector. Zero-initialised: it was never sent anything. */
@@ -36,7 +36,8 @@ typedef struct {
 
 /**
  * Start at `now_ms` without knowing what went before: every connector may draw its maximum until the validity of the last
- * setpoint of an earlier life has ended. All setpoints are sent with `validity_ms`.
+ * setpoint of an earlier life has ended. Whatever was on its way in that life has arrived by now, or never will: a start
+ * takes longer than a queue. All setpoints are sent with `validity_ms`.
  */
 void taper_ledger_init(taper_ledger_t *ledger, const taper_station_config_t *config, uint32_t validity_ms,
                        uint32_t now_ms);

@@ -38,7 +38,7 @@
 /** What such a vehicle is offered at least, however full it is by our account [Wh]. */
 #define TAPER_OPEN_NEED_LEAST_Wh 1000
 /** Stay assumed for a vehicle that told no departure, or while the clock was never set [s]. */
-#define TAPER_DEFAULT_STAY_s (8 * 3600)
+#define TAPER_DEFAULT_STAY_s 28800
 /** A wall clock this far from where our own has got to was set: a jump, not drift [s]. */
 #define TAPER_CLOCK_JUMP_s 5
 
