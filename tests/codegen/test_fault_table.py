@@ -7,6 +7,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 UNIT = ROOT / "tests" / "unit"
+ON_VCAN = ROOT / "tests" / "vcan" / "test_fault_timing.py"
 ROWS = range(1, 49)
 
 
@@ -52,6 +53,11 @@ def test_every_test_that_the_table_names_runs(page):
 
 def test_the_table_names_every_test_of_a_row(page):
     assert run_tests(UNIT) - named_tests(page) == set()
+
+
+def test_the_table_of_the_virtual_bus_names_its_tests(page):
+    named = re.findall(r"^\| [\d, ]+ \| [^|]+ \| `(test_row_\w+)` \|$", section(page), re.MULTILINE)
+    assert sorted(named) == sorted(re.findall(r"^def (test_row_\w+)\(", ON_VCAN.read_text(), re.MULTILINE))
 
 
 def test_every_row_has_a_test_or_is_said_to_have_none(page):
