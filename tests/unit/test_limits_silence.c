@@ -140,6 +140,18 @@ static void test_other_load_above_the_limit_leaves_nothing(void) {
     TEST_ASSERT_EQUAL_INT32(6000, taper_limits_now(&limits, now_ms).other_W);
 }
 
+static void test_a_limit_that_stays_negative_is_noted_once(void) {
+    for (unsigned k = 0; k < 10; k++) {
+        say(true, -100);
+        pass(1, false);
+    }
+    TEST_ASSERT_EQUAL_UINT(1, noted(TAPER_EVENT_LIMIT_NEGATIVE));
+    TEST_ASSERT_EQUAL_UINT32(10, limits.negative);
+    say(true, 5000);
+    say(true, -100);
+    TEST_ASSERT_EQUAL_UINT(2, noted(TAPER_EVENT_LIMIT_NEGATIVE));
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_heartbeats_alone_are_trusted_after_120_seconds_of_the_bus_at_any_time_scale);
@@ -151,5 +163,6 @@ int main(void) {
     RUN_TEST(test_a_meter_that_was_above_the_assumed_maximum_stays_there_when_lost);
     RUN_TEST(test_a_phase_without_a_value_counts_as_a_third_and_feeding_in_gives_nothing);
     RUN_TEST(test_other_load_above_the_limit_leaves_nothing);
+    RUN_TEST(test_a_limit_that_stays_negative_is_noted_once);
     return UNITY_END();
 }

@@ -48,9 +48,38 @@ static void test_times_that_go_back_do_not_make_a_node_babble(void) {
     TEST_ASSERT_EQUAL(0, taper_station_counter(&bench.station, TAPER_COUNTER_FRAMES_BABBLED));
 }
 
+static void test_a_node_with_several_lasting_conditions_does_not_fill_the_log(void) {
+    taper_message_t message = {.kind = TAPER_MESSAGE_EMCY, .node = NODE};
+    for (unsigned second = 0; second < 30; second++) {
+        for (uint16_t code = 1; code <= 6; code++) { /* as EMCY is repeated */
+            message.as.emcy = (taper_emcy_t){.severity = TAPER_SEVERITY_FAULT, .code = code};
+            bench_send(&message);
+        }
+        bench_poll(1000);
+    }
+    TEST_ASSERT_EQUAL_UINT(TAPER_EMCYS_OF_NODE, bench_events(TAPER_EVENT_EMCY_HEARD));
+    bench.now_ms += 60000;
+    bench_send(&message); /* what is new, or lasts, is told again after a minute */
+    bench_poll(1000);
+    TEST_ASSERT_EQUAL_UINT(TAPER_EMCYS_OF_NODE + 1, bench_events(TAPER_EVENT_EMCY_HEARD));
+}
+
+static void test_a_node_that_comes_back_after_a_turn_of_the_clock_is_heard(void) {
+    const uint32_t gone_ms = bench.now_ms;
+    bench_send_status(NODE, true);
+    bench_step();
+    bench.now_ms = gone_ms - 30000u; /* 49.7 days later, less 30 s */
+    bench_step();
+    bench_send_status(NODE, true);
+    bench_step();
+    TEST_ASSERT_TRUE(taper_session_is_online(&bench.station.sessions, NODE - 1, bench.now_ms - 1000u));
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_times_that_go_back_do_not_hide_a_node_that_babbles);
     RUN_TEST(test_times_that_go_back_do_not_make_a_node_babble);
+    RUN_TEST(test_a_node_with_several_lasting_conditions_does_not_fill_the_log);
+    RUN_TEST(test_a_node_that_comes_back_after_a_turn_of_the_clock_is_heard);
     return UNITY_END();
 }

@@ -319,6 +319,13 @@ static void test_a_clock_that_jumps_moves_the_departure(void) {
     TEST_ASSERT_EQUAL_INT32(30 * 60, bench_demand(&bench)->departs_in_s);
 }
 
+static void test_two_clocks_of_one_second_that_arrive_unevenly_are_no_jump(void) {
+    bench_report_time(&bench, NOON, 0, 1);
+    bench.now_ms += 997;
+    bench_report_time(&bench, NOON, 998, 1); /* it took 1 ms less on its way */
+    TEST_ASSERT_EQUAL_UINT32(0, bench.table.clock_jumps);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_need_is_the_target_less_what_was_charged);
@@ -358,5 +365,6 @@ int main(void) {
     RUN_TEST(test_a_set_clock_is_held_over_when_its_source_is_lost);
     RUN_TEST(test_the_clock_is_held_over_for_longer_than_the_tick_counter_lasts);
     RUN_TEST(test_a_clock_that_jumps_moves_the_departure);
+    RUN_TEST(test_two_clocks_of_one_second_that_arrive_unevenly_are_no_jump);
     return UNITY_END();
 }

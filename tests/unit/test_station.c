@@ -151,6 +151,34 @@ static void test_a_feeder_tree_that_is_none_is_refused_at_boot(void) {
     TEST_ASSERT_EQUAL(TAPER_ERR_CONFIG, taper_station_init(&bench.station, &with));
 }
 
+/** A second of two vehicles under 13 kW, the first on a grid of 253 V, and perhaps `silent`. */
+static void pass_at_253_V(bool silent) {
+    const taper_message_t high = {.kind = TAPER_MESSAGE_EVSE_ELEC,
+                                  .node = 1,
+                                  .as.evse_elec = {.voltage_mV = 253000, .power_W = 0, .energy_Wh = 0}};
+    bench_send_limit(13000);
+    bench_send_status(2, true);
+    bench_send_vehicle(2, 7, 500);
+    if (!silent) {
+        bench_send_status(1, true);
+        bench_send_vehicle(1, 7, 500);
+        bench_send(&high);
+    }
+    bench_step();
+}
+
+static void test_a_connector_that_falls_silent_stays_booked_by_its_measured_voltage(void) {
+    bench_send_all(0, 13000);
+    bench_step();
+    for (int tick = 0; tick < 8; tick++) {
+        pass_at_253_V(tick >= 4);
+        const int64_t silent_mW = (int64_t)taper_ledger_may_mA(&bench.station.ledger, 0) * 3 * 253;
+        const int64_t other_mW = (int64_t)taper_ledger_may_mA(&bench.station.ledger, 1) * 3 * 230;
+        TEST_ASSERT_TRUE(tick == 0 || tick > 5 || silent_mW > 0);
+        TEST_ASSERT_LESS_OR_EQUAL_INT64(INT64_C(13000000), silent_mW + other_mW);
+    }
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_without_a_planner_a_soc_frame_still_gives_a_setpoint_frame);
@@ -164,5 +192,6 @@ int main(void) {
     RUN_TEST(test_options_that_make_no_sense_are_refused);
     RUN_TEST(test_a_description_out_of_range_is_refused_at_boot);
     RUN_TEST(test_a_feeder_tree_that_is_none_is_refused_at_boot);
+    RUN_TEST(test_a_connector_that_falls_silent_stays_booked_by_its_measured_voltage);
     return UNITY_END();
 }

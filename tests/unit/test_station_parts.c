@@ -168,6 +168,15 @@ static void test_the_event_log_goes_on_when_its_count_wraps(void) {
     taper_event_note(NULL, TAPER_EVENT_STARTED, 0, 0, 3); /* no log keeps nothing */
 }
 
+static void test_a_store_keeps_the_gateways_failsafe_limit_and_not_the_descriptions(void) {
+    taper_station_options_t options = bench_options();
+    taper_station_config_t lower = *options.config;
+    lower.failsafe_W = options.config->failsafe_W / 2;
+    options.config = &lower; /* the same store, written by the start before */
+    TEST_ASSERT_EQUAL(TAPER_OK, taper_station_init(&bench.station, &options));
+    TEST_ASSERT_EQUAL_INT32(lower.failsafe_W, bench.station.limits.failsafe_W);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_a_node_may_send_a_seconds_worth_at_once_and_no_frame_more);
@@ -180,5 +189,6 @@ int main(void) {
     RUN_TEST(test_more_alarms_than_places_lose_the_last_and_no_other);
     RUN_TEST(test_the_event_log_keeps_the_newest);
     RUN_TEST(test_the_event_log_goes_on_when_its_count_wraps);
+    RUN_TEST(test_a_store_keeps_the_gateways_failsafe_limit_and_not_the_descriptions);
     return UNITY_END();
 }

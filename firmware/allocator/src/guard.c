@@ -44,7 +44,8 @@ static void sum_groups(const taper_station_config_t *config, const taper_snapsho
         const taper_connector_config_t *connector = &config->connectors[i];
         const int32_t nominal_W_per_A = (connector->voltage_mV + 999) / 1000 * connector->phases;
         const taper_demand_t *demand = &snapshot->demand[i];
-        const int32_t W_per_A = demand->active ? taper_demand_booked_W_per_A(demand) : nominal_W_per_A;
+        const int32_t W_per_A = demand->active ? taper_demand_booked_W_per_A(demand)
+                                               : taper_max_i32(demand->booked_W_per_A, nominal_W_per_A);
         sum_mW[connector->group] += (int64_t)current_mA[i] * W_per_A;
     }
     for (uint8_t k = config->group_count; k-- > 1;) {

@@ -31,5 +31,6 @@ int32_t taper_rooms_W_per_A(const taper_station_config_t *config, const taper_sn
     if (snapshot->demand[i].active) {
         return taper_demand_booked_W_per_A(&snapshot->demand[i]);
     }
-    return (connector->voltage_mV + 999) / 1000 * connector->phases;
+    return taper_max_i32((connector->voltage_mV + 999) / 1000 * connector->phases,
+                         snapshot->demand[i].booked_W_per_A);
 }

@@ -6,9 +6,10 @@
 /* So far back is out of order; what is further back is a clock that wrapped. */
 #define OUT_OF_ORDER_ms 60000u
 
-uint32_t taper_node_guard_time(const taper_node_guard_t *guard, uint32_t at_ms) {
+uint32_t taper_node_guard_time(const taper_node_guard_t *guard, uint32_t at_ms, uint32_t now_ms) {
     const uint32_t back_ms = taper_elapsed_ms(guard->refilled_ms, at_ms);
-    return guard->known && back_ms <= OUT_OF_ORDER_ms ? guard->refilled_ms : at_ms;
+    const bool out_of_order = back_ms <= OUT_OF_ORDER_ms && taper_time_reached(now_ms, guard->refilled_ms);
+    return guard->known && out_of_order ? guard->refilled_ms : at_ms;
 }
 
 static void refill(taper_node_guard_t *guard, uint32_t per_second, uint32_t at_ms) {

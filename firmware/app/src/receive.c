@@ -120,15 +120,29 @@ static void note_bad_field(taper_station_t *station, const sender_t *sender, con
     }
 }
 
+/** Whether an EMCY is news: it was not noted within the last minute, and not too many others were. */
+static bool emcy_is_news(taper_node_guard_t *guard, uint16_t code, uint32_t at_ms) {
+    taper_emcy_note_t *place = NULL;
+    for (unsigned k = 0; k < TAPER_EMCYS_OF_NODE; k++) {
+        taper_emcy_note_t *note = &guard->emcy[k];
+        const bool lately = note->noted && taper_elapsed_ms(at_ms, note->at_ms) < SAME_TROUBLE_ms;
+        if (lately && note->code == code) {
+            return false;
+        }
+        place = lately ? place : note;
+    }
+    if (place != NULL) {
+        *place = (taper_emcy_note_t){.noted = true, .code = code, .at_ms = at_ms};
+    }
+    return place != NULL;
+}
+
 static void hear_emcy(taper_station_t *station, const sender_t *sender, const taper_message_t *message,
                       uint32_t at_ms) {
-    taper_node_guard_t *guard = sender->guard;
     const uint16_t code = message->as.emcy.code;
-    if (guard->emcy_code != code || taper_elapsed_ms(at_ms, guard->emcy_ms) >= SAME_TROUBLE_ms) {
+    if (emcy_is_news(sender->guard, code, at_ms)) {
         taper_event_note(&station->events, TAPER_EVENT_EMCY_HEARD, message->bus, message->node, code);
-        guard->emcy_ms = at_ms;
     }
-    guard->emcy_code = code;
 }
 
 static void use_message(taper_station_t *station, const sender_t *sender, const taper_message_t *message,
@@ -212,7 +226,7 @@ static void take_report(taper_station_t *station, taper_frame_t *frame) {
         taper_station_count(station, TAPER_COUNTER_FRAMES_UNKNOWN);
         return;
     }
-    frame->time_ms = taper_node_guard_time(sender.guard, frame->time_ms);
+    frame->time_ms = taper_node_guard_time(sender.guard, frame->time_ms, station->events.now_ms);
     const uint32_t most_per_second = TOO_MUCH * (sender.connector < 0 ? GATEWAY_NOMINAL : CONNECTOR_NOMINAL);
     if (!taper_node_guard_passes(station, sender.guard, most_per_second, frame) ||
         !is_good(station, sender.receiver, frame)) {

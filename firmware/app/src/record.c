@@ -38,12 +38,16 @@ static unsigned find_newest(taper_station_t *station, unsigned *present) {
     return good;
 }
 
+static int32_t failsafe_told_W(const taper_station_t *station) {
+    return station->limits.failsafe_told ? station->limits.failsafe_W : TAPER_ABSENT;
+}
+
 /** What could not be written is not on record, and will be tried again. */
 static void write_record(taper_station_t *station) {
     const taper_port_t *port = station->options.port;
     taper_station_record_t record = station->record;
     record.sequence++;
-    record.failsafe_W = station->limits.failsafe_W;
+    record.failsafe_W = failsafe_told_W(station);
     record.crc32 = taper_crc32((const uint8_t *)&record, COVERED);
     if (port->store_write(port->context, station->record_copy, &record, sizeof record)) {
         station->record = record;
@@ -57,7 +61,7 @@ static bool has_store(const taper_station_t *station) {
 
 void taper_record_load(taper_station_t *station) {
     const int32_t built_W = station->options.config->groups[0].limit_W;
-    station->record.failsafe_W = station->options.config->failsafe_W;
+    station->record.failsafe_W = TAPER_ABSENT;
     if (!has_store(station)) {
         return;
     }
@@ -68,7 +72,10 @@ void taper_record_load(taper_station_t *station) {
     } else if (good < present) {
         taper_event_note(&station->events, TAPER_EVENT_STORE_OLD_COPY, 0, 0, 0);
     }
-    station->limits.failsafe_W = taper_clamp_i32(station->record.failsafe_W, 0, built_W);
+    if (station->record.failsafe_W != TAPER_ABSENT) {
+        station->limits.failsafe_W = taper_clamp_i32(station->record.failsafe_W, 0, built_W);
+        station->limits.failsafe_told = true;
+    }
     if (station->record.starts != UINT32_MAX) {
         station->record.starts++;
     }
@@ -76,7 +83,7 @@ void taper_record_load(taper_station_t *station) {
 }
 
 void taper_record_update(taper_station_t *station, uint32_t now_ms) {
-    const bool changed = station->record.failsafe_W != station->limits.failsafe_W;
+    const bool changed = station->record.failsafe_W != failsafe_told_W(station);
     if (has_store(station) && changed && taper_elapsed_ms(now_ms, station->record_ms) >= WRITE_GAP_ms) {
         station->record_ms = now_ms;
         write_record(station);

@@ -19,7 +19,7 @@ void taper_station_receive(taper_station_t *station, uint32_t now_ms);
  * Time of a node's frame, not before that of its last one: a port that works out times from ages may be wrong by a hair, and
  * a time that goes back would count as one of weeks.
  */
-uint32_t taper_node_guard_time(const taper_node_guard_t *guard, uint32_t at_ms);
+uint32_t taper_node_guard_time(const taper_node_guard_t *guard, uint32_t at_ms, uint32_t now_ms);
 
 /** Whether a frame of a node is within three times the node's nominal rate, and the node is not babbling. */
 bool taper_node_guard_passes(taper_station_t *station, taper_node_guard_t *guard, uint32_t per_second,

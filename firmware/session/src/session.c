@@ -236,6 +236,13 @@ static void note_clock(taper_session_table_t *table, int32_t moved_s) {
     taper_event_note(table->log, TAPER_EVENT_CLOCK_SET, 0, 0, moved_s);
 }
 
+/* How far the wall clock moved against ours. Frames of one second that arrive unevenly may go back by a hair. */
+static int64_t clock_moved_s(const taper_session_table_t *table, uint32_t unix_s, uint32_t at_ms) {
+    const bool back = !taper_time_reached(at_ms, table->clock_heard.at_ms);
+    const uint32_t ours_s = back ? table->unix_s : taper_session_unix_s(table, at_ms);
+    return (int64_t)unix_s - ours_s;
+}
+
 static void apply_time(taper_session_table_t *table, const taper_time_sync_t *time, uint32_t now_ms) {
     if (time->quality == 0) {
         return; /* a gateway that lost its own clock does not take ours away */
@@ -244,7 +251,7 @@ static void apply_time(taper_session_table_t *table, const taper_time_sync_t *ti
     if (!table->clock_heard.heard) {
         note_clock(table, 0);
     } else {
-        const int64_t moved_s = (int64_t)time->unix_s - taper_session_unix_s(table, at_ms);
+        const int64_t moved_s = clock_moved_s(table, time->unix_s, at_ms);
         const int64_t drift_s = (int64_t)TAPER_CLOCK_JUMP_s * table->time_scale;
         if (moved_s > drift_s || moved_s < -drift_s) {
             taper_count(&table->clock_jumps);

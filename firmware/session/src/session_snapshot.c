@@ -77,6 +77,13 @@ static int32_t phases_booked(const taper_connector_config_t *connector, const ta
     return anywhere && !connector->is_dc ? 3 : phases_in_use(connector, session);
 }
 
+/* What 1 A counts for a connector that may still draw, but is not planned for: whatever its phases do by now. */
+static int32_t most_booked_W_per_A(const taper_connector_config_t *connector, const taper_session_t *session,
+                                   uint32_t now_ms) {
+    const int32_t phases = taper_max_i32(connector->phases, phases_booked(connector, session));
+    return volts(connector, session, now_ms) * phases;
+}
+
 /* minimum <= target <= maximum, repaired by moving the target; where the bounds contradict, the maximum holds. */
 static int32_t repaired_target(int32_t target, int32_t minimum, int32_t maximum) {
     if (target == TAPER_ABSENT) {
@@ -158,6 +165,7 @@ bool taper_session_demand(const taper_session_table_t *table, uint8_t connector,
     const taper_connector_config_t *config = &table->config->connectors[connector];
     const taper_session_t *session = &table->session[connector];
     memset(demand, 0, sizeof *demand);
+    demand->booked_W_per_A = most_booked_W_per_A(config, session, now_ms);
     if (obstacle(table, connector, now_ms) != TAPER_REASON_PLANNED) {
         return false;
     }

@@ -48,20 +48,30 @@ static void apply_heartbeat(taper_limits_t *limits, uint32_t at_ms) {
     }
 }
 
+/** Every negative limit counts; the log has the first in a row. */
+static void note_sign(taper_limits_t *limits, int32_t limit_W) {
+    const bool negative = limit_W < 0;
+    if (negative) {
+        taper_count(&limits->negative);
+    }
+    if (negative && !limits->is_negative) {
+        taper_event_note(limits->log, TAPER_EVENT_LIMIT_NEGATIVE, 0, TAPER_NODE_GATEWAY, limit_W);
+    }
+    limits->is_negative = negative;
+}
+
 void taper_limits_apply(taper_limits_t *limits, const taper_site_limit_t *message, uint32_t at_ms) {
     beat(limits, at_ms);
     if (message->failsafe_W != TAPER_ABSENT) {
         limits->failsafe_W = taper_clamp_i32(message->failsafe_W, 0, limits->config->groups[0].limit_W);
+        limits->failsafe_told = true;
     }
     if (message->active && message->limit_W == TAPER_ABSENT) {
         apply_heartbeat(limits, at_ms);
         return;
     }
     limits->beating_since_ms = at_ms;
-    if (message->active && message->limit_W < 0) {
-        taper_count(&limits->negative);
-        taper_event_note(limits->log, TAPER_EVENT_LIMIT_NEGATIVE, 0, TAPER_NODE_GATEWAY, message->limit_W);
-    }
+    note_sign(limits, message->active ? message->limit_W : 0);
     const bool shorter =
         message->validity_s != TAPER_ABSENT && message->validity_s * 1000 < TAPER_SITE_LIMIT_TIMEOUT_ms;
     set_gateway_limit(limits, message->active ? taper_max_i32(message->limit_W, 0) : INT32_MAX,

@@ -63,6 +63,16 @@ typedef struct {
     uint32_t count[TAPER_COUNTERS];
 } taper_station_counters_t;
 
+/** Codes of a node's EMCY that are told apart in the log; more of them in a minute are not noted. */
+#define TAPER_EMCYS_OF_NODE 4
+
+/** An EMCY that was noted in the log. */
+typedef struct {
+    bool noted;
+    uint16_t code;
+    uint32_t at_ms;
+} taper_emcy_note_t;
+
 /** The listener's state for one node. */
 typedef struct {
     uint32_t tokens_x1000; /**< frames that it may still send, in thousandths */
@@ -70,9 +80,8 @@ typedef struct {
     uint32_t excess_ms;       /**< last frame above the rate */
     uint32_t excess_since_ms; /**< first one of this excess */
     bool in_excess, babbling;
-    bool known;         /**< heard before: the tokens count */
-    uint16_t emcy_code; /**< its last EMCY, and when */
-    uint32_t emcy_ms;
+    bool known; /**< heard before: the tokens count */
+    taper_emcy_note_t emcy[TAPER_EMCYS_OF_NODE];
     bool bad_field_noted; /**< at `bad_field_ms`: the log is not for every frame */
     uint32_t bad_field_ms;
 } taper_node_guard_t;
@@ -100,7 +109,7 @@ typedef struct {
 /** What survives a restart. Written whole, two copies in turn. */
 typedef struct {
     uint32_t sequence;
-    int32_t failsafe_W; /**< the gateway's last word on it */
+    int32_t failsafe_W; /**< the gateway's last word on it, or absent: the description's holds */
     uint32_t starts;
     uint32_t crc32; /**< over the rest */
 } taper_station_record_t;

@@ -116,7 +116,8 @@ void taper_session_update(taper_session_table_t *table, uint32_t now_ms);
 /**
  * What every vehicle wants at `now_ms`, that of the last update; `snapshot->now_ms` is in the world's time. Reports past their timeout do not count; what a
  * vehicle asked for (complete, pause, stop) and its error hold until it says otherwise, since vehicles that are done
- * fall asleep. Demands that are not active are all zero. Cost: O(connectors).
+ * fall asleep. Demands that are not active are all zero, but
+ * for what their connector is booked by while it may still draw. Cost: O(connectors).
  */
 void taper_session_snapshot(const taper_session_table_t *table, uint32_t now_ms, taper_snapshot_t *snapshot);
 

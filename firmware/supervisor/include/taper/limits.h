@@ -35,10 +35,12 @@ typedef struct {
     uint32_t beating_since_ms; /**< without a pause, and without a limit */
     int32_t gateway_W;         /**< what it said, >= 0; INT32_MAX: no limit in force */
     int32_t failsafe_W;        /**< >= 0 */
+    bool failsafe_told;        /**< that is the gateway's word, and not the description's */
     bool meter_heard, meter_alive;
     uint32_t meter_ms; /**< when the last SITE_METER came */
     int32_t metered_W; /**< what it said, >= 0 */
     uint32_t negative; /**< limits below zero, taken as zero */
+    bool is_negative;  /**< the last one was */
 } taper_limits_t;
 
 typedef struct {

@@ -113,7 +113,10 @@ typedef struct {
     uint8_t group_count;
 } taper_station_config_t;
 
-/** One vehicle's demand at the instant of a snapshot. Meaningless unless `active`. */
+/**
+ * One vehicle's demand at the instant of a snapshot. Meaningless unless `active`, but for `booked_W_per_A`: by that, or by
+ * its description if that is more, counts what a connector without a demand may still draw.
+ */
 typedef struct {
     bool active;            /**< a vehicle is there, is sound, and still wants energy */
     bool soc_estimated;     /**< `stored_Wh` rests on measured energy because the reported SOC is stale */
