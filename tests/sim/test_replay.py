@@ -136,12 +136,13 @@ def test_another_interface_goes_before_that_of_the_companion(sim, own):
 
 
 def test_another_station_needs_limits_that_it_can_have(sim, own):
-    own()
-    run = sim.call(*OWN, "--station", "paper")
+    own("hub\nlimit_W=80000", "garage\nlimit_W=400000")
+    run = sim.call(*GIVEN)
     assert run.code == 2
-    assert "--limit-kw: above the own limit of station paper" in run.stderr
-    run = sim.call(*OWN, "--station", "paper", "--limit-kw", "1", "--failsafe-kw", "0")
-    assert run.stderr.splitlines()[0].startswith("taper-sim: note: not as bus.log.station says: station=paper limit_W=1000")
+    assert run.stderr == "taper-sim: --limit-kw: above the own limit of station hub, 110 kW\n"
+    run = sim.call(*GIVEN, "--limit-kw", "80")
+    assert run.code == 4
+    assert run.stderr == "taper-sim: note: not as bus.log.station says: station=hub limit_W=80000\n"
 
 
 def test_a_recording_of_another_version_is_replayed_with_a_note(sim, own):
