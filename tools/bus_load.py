@@ -89,8 +89,8 @@ def run_inside(options: argparse.Namespace) -> None:
 # Outside: on this machine
 
 
-def cpu_of_tree_s(root: int) -> float:
-    """CPU time of a process and all below it that still run."""
+def cpu_of_tree_s(root: int) -> dict[int, float]:
+    """CPU time of a process and all below it that still run, by process."""
     parents, cpu_s = {}, {}
     for path in Path("/proc").glob("[0-9]*/stat"):
         try:
@@ -102,20 +102,21 @@ def cpu_of_tree_s(root: int) -> float:
     below = {root}
     while grown := {process for process, parent in parents.items() if parent in below} - below:
         below |= grown
-    return sum(cpu_s.get(process, 0.0) for process in below)
+    return {process: cpu_s[process] for process in below if process in cpu_s}
 
 
 def watch(wrapper: subprocess.Popen) -> dict[str, float]:
     """CPU use of all processes [percent of a core] between the marks, by the name of the first."""
     percent = {}
-    name, before_s, began_s = "", 0.0, 0.0
+    name, before_s, began_s = "", {}, 0.0
     for line in wrapper.stdout:
         if not line.startswith("mark "):
             print(line, end="")
             continue
         cpu_s, now_s = cpu_of_tree_s(wrapper.pid), time.monotonic()
-        if line.split()[1] == "end":
-            percent[name] = 100 * (cpu_s - before_s) / (now_s - began_s)
+        if line.split()[1] == "end":  # one that has ended meanwhile takes its time along
+            used_s = sum(used - before_s.get(process, 0.0) for process, used in cpu_s.items())
+            percent[name] = 100 * used_s / (now_s - began_s)
         name, before_s, began_s = line.split()[1], cpu_s, now_s
     return percent
 

@@ -34,11 +34,16 @@ uint64_t taper_argument_whole(const char *option, const char *text, uint64_t low
     return value;
 }
 
-unsigned taper_argument_station(const char *option, const char *name, struct argp_state *state) {
+unsigned taper_argument_find_station(const char *name) {
     unsigned i = 0;
     while (i < taper_station_count && strcmp(taper_stations[i]->name, name) != 0) {
         i++;
     }
+    return i;
+}
+
+unsigned taper_argument_station(const char *option, const char *name, struct argp_state *state) {
+    const unsigned i = taper_argument_find_station(name);
     if (i == taper_station_count) {
         argp_error(state, "%s: unknown station '%s'; there are %s", option, name,
                    taper_argument_station_names());

@@ -15,6 +15,9 @@ uint64_t taper_argument_whole(const char *option, const char *text, uint64_t low
 /** The index of a station in taper_stations[]. */
 unsigned taper_argument_station(const char *option, const char *name, struct argp_state *state);
 
+/** The index of a station in taper_stations[], or taper_station_count: there is none of that name. */
+unsigned taper_argument_find_station(const char *name);
+
 /** The names of all stations, separated by commas. To be freed. */
 char *taper_argument_station_names(void);
 

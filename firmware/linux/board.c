@@ -42,7 +42,7 @@ static bool take(void *context, taper_frame_t *frame) {
     *frame = board->held;
     frame->time_ms = (uint32_t)time_ms;
     if (board->record != NULL) {
-        taper_record_frame(board->record, frame, time_ms, TAPER_CANDUMP_RECEIVED);
+        taper_record_frame(board->record, frame, time_ms);
     }
     return true;
 }
@@ -51,7 +51,7 @@ static bool put(void *context, const taper_frame_t *frame) {
     taper_board_t *board = context;
     const bool taken = board->can->send(board->can->context, frame);
     if (taken && board->record != NULL) {
-        taper_record_frame(board->record, frame, board->now_ms, TAPER_CANDUMP_SENT);
+        taper_record_frame(board->record, frame, board->now_ms);
     }
     return taken;
 }

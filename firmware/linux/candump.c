@@ -19,11 +19,9 @@ size_t taper_candump_format(const taper_candump_line_t *line, char text[TAPER_CA
     for (unsigned i = 0; i < line->frame.length && i < TAPER_FRAME_LENGTH; i++) {
         (void)snprintf(&data[(size_t)2 * i], 3, "%02X", (unsigned)line->frame.data[i]);
     }
-    const bool word = line->direction != TAPER_CANDUMP_NO_WORD;
-    const int length =
-        snprintf(text, TAPER_CANDUMP_LINE, "(%010" PRIu64 ".%06" PRIu64 ") %s %03X#%s%s%.1s\n",
-                 line->time_us / US_PER_S, line->time_us % US_PER_S, line->interface,
-                 (unsigned)line->frame.id, data, word ? " " : "", word ? &line->direction : "");
+    const int length = snprintf(text, TAPER_CANDUMP_LINE, "(%010" PRIu64 ".%06" PRIu64 ") %s %03X#%s\n",
+                                line->time_us / US_PER_S, line->time_us % US_PER_S, line->interface,
+                                (unsigned)line->frame.id, data);
     return (size_t)length;
 }
 
@@ -95,9 +93,7 @@ taper_candump_verdict_t taper_candump_parse(const char *text, taper_candump_line
     if (rest == NULL || sscanf(rest, "%15s %159s %1s", line->interface, frame, word) < 2) {
         return TAPER_CANDUMP_BAD;
     }
-    line->direction = (char)toupper((unsigned char)word[0]);
-    if (line->direction != TAPER_CANDUMP_NO_WORD && line->direction != TAPER_CANDUMP_RECEIVED &&
-        line->direction != TAPER_CANDUMP_SENT) {
+    if (word[0] != '\0' && strchr("RrTt", word[0]) == NULL) {
         return TAPER_CANDUMP_BAD;
     }
     return parse_frame(frame, &line->frame);

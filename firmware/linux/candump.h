@@ -1,9 +1,9 @@
 /**
  * Lines of a CAN log as `candump -l`, canplayer and python-can write and read them:
  *
- *     (1436509052.249713) can0 0C1#76100000060C0707 T
+ *     (1436509052.249713) can0 0C1#76100000060C0707
  *
- * The last word is optional: R received, T sent by who wrote the log.
+ * python-can adds R or T, received or sent by who wrote the log. That word is passed over, and not written.
  */
 #ifndef TAPER_LINUX_CANDUMP_H
 #define TAPER_LINUX_CANDUMP_H
@@ -14,17 +14,13 @@
 #include "taper/frame.h"
 
 /** Longest line that is written, with its end and the closing NUL. */
-#define TAPER_CANDUMP_LINE     80
-#define TAPER_CANDUMP_NAME     16
-#define TAPER_CANDUMP_NO_WORD  '\0'
-#define TAPER_CANDUMP_RECEIVED 'R'
-#define TAPER_CANDUMP_SENT     'T'
+#define TAPER_CANDUMP_LINE 80
+#define TAPER_CANDUMP_NAME 16
 
 typedef struct {
     uint64_t time_us; /**< wall clock, since 1970 */
     char interface[TAPER_CANDUMP_NAME];
     taper_frame_t frame; /**< id, length and data; bus and time_ms are not in the text */
-    char direction;      /**< TAPER_CANDUMP_RECEIVED, .._SENT or .._NO_WORD */
 } taper_candump_line_t;
 
 typedef enum {

@@ -15,6 +15,8 @@
 #include "report.h"
 #include "taper/stations.h"
 
+_Static_assert(TAPER_COMPANION_BUSES >= TAPER_SOCKETCAN_BUSES, "a companion must hold all interfaces");
+
 typedef struct {
     const taper_options_t *options;
     uint64_t start_us;      /**< CLOCK_MONOTONIC at station time 0 */
@@ -115,11 +117,15 @@ static bool open_can(daemon_t *daemon, const taper_options_t *options) {
     return true;
 }
 
-static bool open_record(daemon_t *daemon, const taper_options_t *options) {
+static bool open_record(daemon_t *daemon, const taper_options_t *options, const taper_made_t *made) {
+    if (options->record == NULL) {
+        return true;
+    }
     // Whole milliseconds: so are all times in the recording.
     const uint64_t start_us = daemon->start_wall_us / 1000 * 1000;
-    if (options->record != NULL &&
-        !taper_record_open(&daemon->record, options->record, options->interfaces, start_us)) {
+    const taper_companion_t companion = taper_companion_of(made, options->setup.station, start_us,
+                                                           options->interfaces, options->interface_count);
+    if (!taper_record_open(&daemon->record, options->record, &companion)) {
         char reason[512];
         (void)snprintf(reason, sizeof reason, "--record: %s: %s", options->record, strerror(errno));
         return fail("record_failed", reason);
@@ -243,7 +249,7 @@ int taper_daemon_run(const taper_options_t *options, taper_made_t *made) {
     if (!open_can(daemon, options)) {
         return TAPER_EXIT_FAILURE;
     }
-    if (!open_record(daemon, options)) {
+    if (!open_record(daemon, options, made)) {
         taper_socketcan_close(&daemon->can);
         return TAPER_EXIT_FAILURE;
     }

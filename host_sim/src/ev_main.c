@@ -24,6 +24,7 @@
 #define SHOW_ms             500
 #define FIRST_NODE_ID(kind) ((uint16_t)((kind) << 6))
 #define ALL_NODES           0x7C0
+#define ONE_NODE            0x7FF
 
 typedef struct {
     const ev_options_t *options;
@@ -44,6 +45,7 @@ static bool open_buses(ev_t *ev) {
         {FIRST_NODE_ID(TAPER_MESSAGE_SETPOINT), ALL_NODES},
         {FIRST_NODE_ID(TAPER_MESSAGE_CTRL_STATUS), ALL_NODES},
         {FIRST_NODE_ID(TAPER_MESSAGE_CTRL_DIAG), ALL_NODES},
+        {FIRST_NODE_ID(TAPER_MESSAGE_ISOTP_TO) | TAPER_NODE_GATEWAY, ONE_NODE},
     };
     const taper_socketcan_options_t options = {.interfaces = ev->options->interfaces,
                                                .count = ev->options->interface_count,

@@ -21,6 +21,7 @@ void sim_field_init(sim_field_t *field, const sim_field_options_t *options, uint
     }
     sim_queue_init(&field->queue, own->sessions, field->evse, station->connector_count, own->outcome);
     sim_gateway_init(&field->gateway, own->limits, own->port, 0, own->seed);
+    sim_curve_init(&field->curve, own->limits);
     sim_field_start_gateway(field);
     sim_tracker_init(&field->tracker, station, own->grace_ms == 0 ? SIM_GRACE_ms : own->grace_ms);
 }
@@ -70,11 +71,19 @@ static void move_vehicles(sim_field_t *field) {
     }
 }
 
+static void gateway_listens(sim_field_t *field, const taper_frame_t *frame) {
+    if (!field->options.no_gateway && !field->gateway_dead) {
+        sim_curve_watch(&field->curve, frame, (uint32_t)field->now_ms);
+        (void)sim_curve_take(&field->curve, frame, (uint32_t)field->now_ms);
+    }
+}
+
 static void listen(sim_field_t *field) {
     const taper_port_t *port = field->options.port;
     taper_frame_t frame;
     for (unsigned taken = 0; taken < MOST_FRAMES && port->receive(port->context, &frame); taken++) {
         sim_watch_take(&field->watch, &frame);
+        gateway_listens(field, &frame);
         const int i = sim_setpoint_connector(field->options.station, &frame);
         if (i >= 0 && !field->evse[i].closed && !field->node[i].dead &&
             sim_evse_hear(&field->evse[i], &frame)) {
@@ -163,6 +172,7 @@ void sim_field_power_off(sim_field_t *field, unsigned node) {
     if (node == SIM_GATEWAY) {
         field->gateway.counter[0] = 0;
         field->gateway.counter[1] = 0;
+        sim_curve_init(&field->curve, field->options.limits);
         sim_field_start_gateway(field);
     } else {
         sim_evse_restart(&field->evse[node]);

@@ -16,6 +16,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "curve.h"
 #include "evse.h"
 #include "gateway.h"
 #include "limits_csv.h"
@@ -71,6 +72,7 @@ typedef struct {
     sim_node_t node[TAPER_MAX_CONNECTORS];
     sim_queue_t queue;
     sim_gateway_t gateway;
+    sim_curve_t curve;
     bool gateway_dead;
     sim_slot_t time_slot, limit_slot;
     bool limit_told; /**< a limit was ever sent, at `limit_told_ms` */

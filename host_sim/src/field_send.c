@@ -10,6 +10,8 @@
 /** Steps of EVSE_ELEC and EV_STATUS on the wire. */
 #define ENERGY_STEP_WH    10
 #define SOC_STEP_PERMILLE 5
+/** Most that is ever due at once: a flow control, and the next frame of the curve. */
+#define CURVE_FRAMES 2
 
 static const sim_cycle_t cycles[SIM_EVSE_FRAMES] = {
     [SIM_EVSE_STATUS] = {TAPER_EVSE_STATUS_CYCLE_ms, 0},
@@ -121,10 +123,25 @@ static void send_limit(sim_field_t *field) {
     field->limit_told_kw = limit_kw;
 }
 
+static void send_curve(sim_field_t *field) {
+    const taper_port_t *port = field->options.port;
+    const uint32_t now_ms = (uint32_t)field->now_ms;
+    taper_frame_t frame;
+    for (unsigned k = 0;
+         k < CURVE_FRAMES && sim_curve_next(&field->curve, sim_field_world_s(field), now_ms, &frame); k++) {
+        if (!port->send(port->context, &frame)) {
+            field->send_refused++;
+            return;
+        }
+        sim_curve_sent(&field->curve, now_ms);
+    }
+}
+
 void sim_field_send(sim_field_t *field) {
     if (!field->options.no_gateway && !field->gateway_dead) {
         send_time(field);
         send_limit(field);
+        send_curve(field);
     }
     for (unsigned i = 0; i < field->options.station->connector_count; i++) {
         if (!field->evse[i].closed && !field->node[i].dead) {

@@ -35,20 +35,23 @@ bool sim_fleet_echo(sim_fleet_t *fleet, unsigned connector) {
     return sim_wire_send(fleet->port, &message, &evse->counter[SIM_EVSE_STATUS]);
 }
 
-void sim_fleet_listen(sim_fleet_t *fleet) {
+void sim_fleet_begin(sim_fleet_t *fleet) {
     for (unsigned i = 0; i < fleet->station->connector_count; i++) {
         fleet->evse[i].in_force = false;
     }
-    sim_fleet_hear(fleet);
+}
+
+void sim_fleet_take(sim_fleet_t *fleet, const taper_frame_t *frame) {
+    const int connector = sim_setpoint_connector(fleet->station, frame);
+    if (connector >= 0) {
+        (void)sim_evse_hear(&fleet->evse[connector], frame);
+    }
 }
 
 void sim_fleet_hear(sim_fleet_t *fleet) {
     taper_frame_t frame;
     while (fleet->port->receive(fleet->port->context, &frame)) {
-        const int connector = sim_setpoint_connector(fleet->station, &frame);
-        if (connector >= 0) {
-            (void)sim_evse_hear(&fleet->evse[connector], &frame);
-        }
+        sim_fleet_take(fleet, &frame);
     }
     // Time stands still between ticks, so a setpoint is valid in the tick in which it came, and in no other.
     for (unsigned i = 0; i < fleet->station->connector_count; i++) {

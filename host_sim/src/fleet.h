@@ -34,10 +34,14 @@ bool sim_fleet_report(sim_fleet_t *fleet, unsigned connector);
 /** A connector reports itself alone, with the setpoint that it accepted last. @return false: the bus is full. */
 bool sim_fleet_echo(sim_fleet_t *fleet, unsigned connector);
 
-/** Take what the station sent in a tick: every connector that hears a valid setpoint obeys it, the others fall back. */
-void sim_fleet_listen(sim_fleet_t *fleet);
+/** All have reported, a tick begins: setpoints of the last one do not count any more. */
+void sim_fleet_begin(sim_fleet_t *fleet);
 
-/** Take what the station sent besides, in the same tick. */
+/** Take in a frame. A connector obeys its setpoint from the next sim_fleet_hear() on. */
+void sim_fleet_take(sim_fleet_t *fleet, const taper_frame_t *frame);
+
+/** Take what the station sent: every connector that has heard a valid setpoint in this tick obeys it, the others fall
+    back. */
 void sim_fleet_hear(sim_fleet_t *fleet);
 
 /** Set the power of a connector's vehicle for the tick that begins at `now_s`. */

@@ -4,19 +4,15 @@
 #include <stddef.h>
 
 #include "taper/codec.h"
+#include "taper/types.h"
 #include "wire.h"
 
-/** The station takes times up to 24 days ahead; it needs to know no more than this. */
-#define CURVE_AHEAD_S (14 * INT64_C(86400))
-/** The curve is handed over again this often; at least this often while it is too long to be handed over whole. */
-#define CURVE_PERIOD_S      86400
-#define LONG_CURVE_PERIOD_S 900.0
-#define MOST_W              2e9
-#define LONGEST_VALIDITY_S  254
+#define MOST_W             2e9
+#define LONGEST_VALIDITY_S 254
 
 void sim_gateway_init(sim_gateway_t *gateway, const sim_limits_t *limits, const taper_port_t *port,
                       int64_t tick_s, uint64_t seed) {
-    *gateway = (sim_gateway_t){.limits = limits, .port = port, .tick_s = tick_s, .next_curve_s = INT64_MIN};
+    *gateway = (sim_gateway_t){.limits = limits, .port = port, .tick_s = tick_s};
     gateway->counter[0] = (uint8_t)((seed >> 4) % 16);
     gateway->counter[1] = (uint8_t)((seed >> 8) % 16);
 }
@@ -60,39 +56,4 @@ bool sim_gateway_report(sim_gateway_t *gateway, int64_t now_s) {
     const int32_t validity_s = taper_clamp_i32((int32_t)gateway->tick_s * 2, 5, LONGEST_VALIDITY_S);
     const bool clock_sent = sim_gateway_send_time(gateway, (double)now_s);
     return sim_gateway_send_limit(gateway, sim_gateway_limit_kw(gateway, now_s), validity_s) && clock_sent;
-}
-
-static uint32_t station_ms(double time_s) {
-    return (uint32_t)(uint64_t)llround(time_s * 1000.0);
-}
-
-/** Add a point; of two in the same millisecond the later one stays. */
-static void add_point(taper_limit_curve_t *curve, double time_s, double limit_kw) {
-    const taper_limit_point_t point = {.time_ms = station_ms(time_s), .limit_W = watts(limit_kw)};
-    if (curve->count > 0 && curve->point[curve->count - 1].time_ms == point.time_ms) {
-        curve->count--;
-    }
-    curve->point[curve->count++] = point;
-}
-
-bool sim_gateway_publish(sim_gateway_t *gateway, taper_station_t *station, int64_t now_s) {
-    const sim_limits_t *limits = gateway->limits;
-    if (limits->count < 2 || now_s < gateway->next_curve_s) {
-        return true;
-    }
-    const double end_s = (double)(now_s + CURVE_AHEAD_S);
-    taper_limit_curve_t curve = {.count = 0};
-    const size_t first = sim_limits_point(limits, (double)now_s);
-    add_point(&curve, (double)now_s, limits->limit_kw[first]);
-    size_t next = first + 1;
-    for (; next < limits->count && limits->time_s[next] < end_s && curve.count < TAPER_MAX_LIMIT_POINTS;
-         next++) {
-        add_point(&curve, limits->time_s[next], limits->limit_kw[next]);
-    }
-    gateway->next_curve_s = now_s + CURVE_PERIOD_S;
-    if (curve.count == TAPER_MAX_LIMIT_POINTS) {
-        const double half_s = limits->time_s[first + (next - first) / 2];
-        gateway->next_curve_s = now_s + (int64_t)fmin(half_s - (double)now_s, LONG_CURVE_PERIOD_S);
-    }
-    return taper_station_set_limit_curve(station, &curve) == TAPER_OK;
 }

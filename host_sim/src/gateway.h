@@ -1,4 +1,4 @@
-/** The simulated energy gateway: the clock and the site limit. */
+/** The simulated energy gateway: the clock and the site limit. What the limit will be: curve.h. */
 #ifndef SIM_GATEWAY_H
 #define SIM_GATEWAY_H
 
@@ -7,32 +7,23 @@
 
 #include "limits_csv.h"
 #include "taper/port.h"
-#include "taper/station.h"
 
 typedef struct {
     const sim_limits_t *limits; /**< NULL: it sets none */
     const taper_port_t *port;
     int64_t tick_s;
-    int64_t next_curve_s; /**< when the known course of the limit is due again */
-    uint8_t counter[2];   /**< TIME_SYNC, SITE_LIMIT */
+    uint8_t counter[2]; /**< TIME_SYNC, SITE_LIMIT */
 } sim_gateway_t;
 
 /**
  * `limits` and `port`, the world's end of the bus, must outlive the gateway. The counters start from bits of `seed`.
- * `tick_s` is for a gateway that reports once per control tick: the three functions below; 0 for another.
+ * `tick_s` is for a gateway that reports once per control tick: the two functions below; 0 for another.
  */
 void sim_gateway_init(sim_gateway_t *gateway, const sim_limits_t *limits, const taper_port_t *port,
                       int64_t tick_s, uint64_t seed);
 
 /** Send TIME_SYNC, and SITE_LIMIT with the limit of the tick that begins at `now_s`. @return false: the bus is full. */
 bool sim_gateway_report(sim_gateway_t *gateway, int64_t now_s);
-
-/**
- * Hand the known course of the limit from `now_s` on to the station, if it is due. This stands in for the ISO-TP
- * transfer of the curve, which the bus does not have yet. A constant limit needs no curve.
- * @return false: the station refused it.
- */
-bool sim_gateway_publish(sim_gateway_t *gateway, taper_station_t *station, int64_t now_s);
 
 /** Limit of the tick that begins at `now_s`: the least that holds in it [kW]. */
 double sim_gateway_limit_kw(const sim_gateway_t *gateway, int64_t now_s);

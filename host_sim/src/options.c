@@ -30,14 +30,13 @@ static const char description[] =
     "except for solve_ms in summary.json, which is wall time. A session that is plugged in at the first tick "
     "after its arrival has queued for 0 s.\n"
     "\n"
-    "RECORDED BUS: --replay-log feeds what taper-station --record wrote to a fresh station with the same "
-    "options, "
-    "and compares all that it sends with the recording, bit by bit. A log of candump -l does too, if it "
-    "begins "
-    "before the station; who sent a frame is then told by its identifier, and its times tell those of the "
-    "station's calls to about a millisecond: a frame that came within that of a call can make a difference "
-    "that "
-    "was none. Both need the station's life from its start, without a store and without bus-off.\n"
+    "RECORDED BUS: --replay-log FILE feeds what taper-station --record FILE wrote to a fresh station, and "
+    "compares all that it sends with the recording, bit by bit. FILE.station, which was written with it, "
+    "tells how the station ran: no other option is needed, and one that is given goes before it. A log of "
+    "candump -l does too, if it begins before the station. It has no FILE.station: --station is needed, and "
+    "its times tell those of the station's calls to about a millisecond; a frame that came within that of a "
+    "call can make a difference that was none. Who sent a frame is told by its identifier. Both need the "
+    "station's life from its start, without a store, bus-off or a second controller.\n"
     "\n"
     "EXIT CODE: 0 good, 1 bad input, 2 bad command line, 3 a limit was exceeded, 4 a replay differs from its "
     "recording.\n";
@@ -76,10 +75,13 @@ static const struct argp_option options[] = {
      "Write every planning problem to this file (input of planner_probe)", 0},
     {"out", KEY_OUT, "DIR", 0,
      "Write the results to this directory, made if missing (default: only print a summary)", 0},
-    {NULL, 0, NULL, 0, "Replay of a recorded bus, with --station, --limit-kw and:", 1},
+    {NULL, 0, NULL, 0,
+     "Replay of a recorded bus. If FILE.station does not tell them, with --station, --limit-kw and:", 1},
     {"replay-log", KEY_REPLAY_LOG, "FILE", 0, "Recording of taper-station or of candump -l (see below)", 1},
     {"can", KEY_CAN, "IFACE", 0,
-     "Interface in the recording; once for each bus, bus 0 first (default: in order of appearance)", 1},
+     "Interface in the recording; once for each bus, bus 0 first (default: as recorded, or in order of "
+     "appearance)",
+     1},
     {"failsafe-kw", KEY_FAILSAFE, "X", 0, "As taper-station was told", 1},
     {"tick-ms", KEY_TICK_MS, "N", 0, "As taper-station was told", 1},
     {"time-scale", KEY_TIME_SCALE, "S", 0, "As taper-station was told", 1},
@@ -148,21 +150,7 @@ static void note_option(sim_options_t *chosen, int key) {
     } else if (key >= KEY_SESSIONS && key < KEY_REPLAY_LOG && !is_of_both(key)) {
         chosen->run_option = name_of(key);
     }
-    chosen->station_given = chosen->station_given || key == KEY_STATION;
-}
-
-static void check_replay(const sim_options_t *chosen, struct argp_state *state) {
-    char reason[160];
-    static taper_made_t made;
-    if (chosen->run_option != NULL) {
-        argp_error(state, "--%s and --replay-log exclude each other", chosen->run_option);
-    }
-    if (!chosen->station_given) {
-        argp_error(state, "--replay-log needs --station");
-    }
-    if (!taper_setup_make(&chosen->replay.setup, &made, reason, sizeof reason)) {
-        argp_error(state, "%s", reason);
-    }
+    chosen->replay.station_given = chosen->replay.station_given || key == KEY_STATION;
 }
 
 /** What can only be checked when all options are known. */
@@ -197,7 +185,9 @@ static void check(sim_options_t *chosen, struct argp_state *state) {
     }
     chosen->replay.setup.station = chosen->station;
     chosen->replay.setup.limit_kw = chosen->limit_kw;
-    check_replay(chosen, state);
+    if (chosen->run_option != NULL) {
+        argp_error(state, "--%s and --replay-log exclude each other", chosen->run_option);
+    }
 }
 
 static void add_interface(sim_replay_options_t *replay, const char *name, struct argp_state *state) {
@@ -273,6 +263,7 @@ sim_options_t sim_options_parse(int argc, char **argv) {
         .options = options, .parser = parse, .doc = description, .help_filter = add_names};
     sim_options_t chosen = {
         .limit_kw = -1.0, .min_current_A = -1.0, .tick_s = 60, .replay.setup = taper_setup_default(0)};
+    chosen.replay.setup.time_scale = 0; // not given
     while (chosen.station < taper_station_count &&
            strcmp(taper_stations[chosen.station]->name, DEFAULT_STATION) != 0) {
         chosen.station++;

@@ -23,9 +23,8 @@ typedef struct {
     uint32_t tick_s;
     uint64_t seed;
     sim_replay_options_t replay; /**< its file is NULL: no replay, a run */
-    bool station_given;
-    const char *run_option;    /**< an option given that only a run knows, or NULL */
-    const char *replay_option; /**< an option given that only a replay knows, or NULL */
+    const char *run_option;      /**< an option given that only a run knows, or NULL */
+    const char *replay_option;   /**< an option given that only a replay knows, or NULL */
 } sim_options_t;
 
 /** Read the command line. Prints and ends the program on --help (0) and on what it does not understand (2). */

@@ -5,10 +5,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "exit_codes.h"
 #include "memory.h"
-#include "options.h"
 #include "replay_log.h"
-#include "taper/stations.h"
+#include "replay_setup.h"
 
 /** In a log that is not the station's own, a sent frame may stand so long after its call, or before, for times are guessed. */
 #define LATE_ms  900
@@ -16,7 +16,7 @@
 
 typedef struct {
     sim_replay_log_t log;
-    taper_made_t made;
+    sim_replay_setup_t setup;
     taper_port_t port;
     taper_station_t station;
     uint64_t now_ms;    /**< of the present call */
@@ -142,7 +142,7 @@ static void call_station(replay_t *replay) {
     replay->status_seen = false;
     if (replay->now_ms >= replay->log.stop_ms) {
         taper_station_stop(&replay->station, now_ms);
-    } else if (replay->now_ms % replay->made.tick_ms == 0) {
+    } else if (replay->now_ms % replay->setup.made.tick_ms == 0) {
         taper_station_step(&replay->station, now_ms);
         replay->silent += replay->status_seen ? 0 : 1;
     } else {
@@ -153,7 +153,7 @@ static void call_station(replay_t *replay) {
 
 /** The call after the present one, as the daemon makes them. */
 static uint64_t next_call_ms(const replay_t *replay) {
-    const uint64_t next_ms = taper_setup_next_ms(replay->now_ms, replay->made.tick_ms);
+    const uint64_t next_ms = taper_setup_next_ms(replay->now_ms, replay->setup.made.tick_ms);
     const uint64_t stop_ms = replay->log.stop_ms;
     if (replay->now_ms >= stop_ms) {
         return replay->now_ms + TAPER_SETUP_STOP_ms;
@@ -186,31 +186,38 @@ static void print_result(const replay_t *replay) {
     }
 }
 
-static bool init_station(replay_t *replay, const sim_replay_options_t *options) {
-    char reason[160];
-    if (!taper_setup_make(&options->setup, &replay->made, reason, sizeof reason)) {
-        fprintf(stderr, "taper-sim: %s\n", reason);
-        return false;
-    }
+static bool init_station(replay_t *replay) {
     replay->port = (taper_port_t){.context = replay, .receive = receive, .send = compare};
-    replay->made.options.port = &replay->port;
-    if (taper_station_init(&replay->station, &replay->made.options) != TAPER_OK) {
+    replay->setup.made.options.port = &replay->port;
+    if (taper_station_init(&replay->station, &replay->setup.made.options) != TAPER_OK) {
         fprintf(stderr, "taper-sim: the firmware refuses the station with these options\n");
         return false;
     }
     return true;
 }
 
+static bool load_log(replay_t *replay, const char *file) {
+    const sim_replay_setup_t *setup = &replay->setup;
+    const sim_replay_source_t source = {.file = file,
+                                        .names = setup->names,
+                                        .name_count = setup->name_count,
+                                        .buses = taper_setup_buses(&setup->made.config),
+                                        .tick_ms = setup->made.tick_ms,
+                                        .exact = setup->own,
+                                        .start_us = setup->companion.start_us};
+    return sim_replay_load(&replay->log, &source);
+}
+
 int sim_replay_run(const sim_replay_options_t *options) {
     replay_t *replay = sim_allocate(1, sizeof *replay);
-    int code = SIM_EXIT_INPUT;
-    if (init_station(replay, options) &&
-        sim_replay_load(&replay->log, options->file, options->names, options->name_count,
-                        taper_setup_buses(&replay->made.config), replay->made.tick_ms)) {
+    int code = sim_replay_set_up(&replay->setup, options);
+    if (code == SIM_EXIT_OK && init_station(replay) && load_log(replay, options->file)) {
         replay->compared = sim_allocate(replay->log.count, sizeof *replay->compared);
         run_calls(replay);
         print_result(replay);
         code = replay->differs ? SIM_EXIT_DIFFERENT : SIM_EXIT_OK;
+    } else if (code == SIM_EXIT_OK) {
+        code = SIM_EXIT_INPUT;
     }
     free(replay->compared);
     sim_replay_free(&replay->log);

@@ -27,14 +27,10 @@ static const sim_replay_frame_t *first_status(const sim_replay_log_t *log) {
     return NULL;
 }
 
-/** Of the station's own recording. Ticks whose CTRL_STATUS was refused may stand before the first. */
-static void set_exact(sim_replay_log_t *log, uint64_t first_us, uint32_t tick_ms) {
-    const uint64_t length_us = (uint64_t)tick_ms * US_PER_MS;
-    const uint64_t before_us = log->frame[0].time_us < first_us ? first_us - log->frame[0].time_us : 0;
-    log->start_us = first_us - (before_us + length_us - 1) / length_us * length_us;
+/** Of the station's own recording, whose start is known. */
+static void set_exact(sim_replay_log_t *log) {
     for (size_t i = 0; i < log->count; i++) {
-        const uint64_t time_us = log->frame[i].time_us;
-        log->frame[i].time_ms = time_us < log->start_us ? 0 : (time_us - log->start_us) / US_PER_MS;
+        log->frame[i].time_ms = (log->frame[i].time_us - log->start_us) / US_PER_MS;
     }
 }
 
@@ -217,7 +213,7 @@ bool sim_replay_set_clock(sim_replay_log_t *log, uint32_t tick_ms) {
         return false;
     }
     if (log->exact) {
-        set_exact(log, first->time_us, tick_ms);
+        set_exact(log);
     } else {
         set_guessed(log, first->time_us, tick_ms);
     }

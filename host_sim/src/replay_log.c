@@ -3,6 +3,7 @@
 #include "replay_log.h"
 
 #include <errno.h>
+#include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,6 +12,9 @@
 #include "memory.h"
 #include "replay_clock.h"
 #include "taper/bus.h"
+
+#define US_PER_MS 1000
+#define US_PER_S  1000000
 
 bool sim_replay_is_of_station(uint16_t id) {
     const unsigned node = id & 0x3FU;
@@ -47,9 +51,8 @@ static void add(sim_replay_log_t *log, const taper_candump_line_t *line, int bus
     log->frame = sim_grow(log->frame, &log->room, log->count + 1, sizeof *log->frame);
     sim_replay_frame_t *frame = &log->frame[log->count++];
     *frame = (sim_replay_frame_t){
-        .time_us = line->time_us, .frame = line->frame, .sent = line->direction == TAPER_CANDUMP_SENT};
+        .time_us = line->time_us, .frame = line->frame, .sent = sim_replay_is_of_station(line->frame.id)};
     frame->frame.bus = (uint8_t)bus;
-    log->exact = log->exact && line->direction != TAPER_CANDUMP_NO_WORD && line->time_us % 1000 == 0;
 }
 
 /** All lines of the file. A last one that was cut short is left out. */
@@ -81,39 +84,54 @@ static bool read_lines(sim_replay_log_t *log, FILE *stream, const char *file, bo
     return good;
 }
 
-/** A log of candump does not tell who sent what: the identifier does. */
-static void set_directions(sim_replay_log_t *log) {
-    for (size_t i = 0; i < log->count && !log->exact; i++) {
-        log->frame[i].sent = sim_replay_is_of_station(log->frame[i].frame.id);
+/** Times of the station's own recording are whole milliseconds from its start on. */
+static bool check_exact(const sim_replay_log_t *log, const char *file) {
+    for (size_t i = 0; log->exact && i < log->count; i++) {
+        const uint64_t time_us = log->frame[i].time_us;
+        if (time_us < log->start_us || (time_us - log->start_us) % US_PER_MS != 0) {
+            fprintf(stderr,
+                    "taper-sim: %s: (%" PRIu64 ".%06" PRIu64 ") is no time of the recording that %s.station "
+                    "tells about\n",
+                    file, time_us / US_PER_S, time_us % US_PER_S, file);
+            return false;
+        }
     }
+    return true;
 }
 
-bool sim_replay_load(sim_replay_log_t *log, const char *file, const char *const *names, unsigned name_count,
-                     unsigned buses, uint32_t tick_ms) {
-    *log = (sim_replay_log_t){.exact = true, .interfaces = name_count};
-    for (unsigned i = 0; i < name_count; i++) {
-        (void)snprintf(log->interface[i], sizeof log->interface[0], "%s", names[i]);
-    }
-    FILE *stream = fopen(file, "r");
-    if (stream == NULL) {
-        fprintf(stderr, "taper-sim: %s: %s\n", file, strerror(errno));
+/** What can only be checked when all lines are known. */
+static bool put_on_clock(sim_replay_log_t *log, const sim_replay_source_t *source) {
+    if (log->interfaces > source->buses) {
+        fprintf(stderr,
+                "taper-sim: %s: more interfaces than the station has buses (%u); name them by --can\n",
+                source->file, source->buses);
         return false;
     }
-    bool good = read_lines(log, stream, file, name_count > 0);
-    (void)fclose(stream);
-    if (good && log->interfaces > buses) {
-        fprintf(stderr,
-                "taper-sim: %s: more interfaces than the station has buses (%u); name them by --can\n", file,
-                buses);
-        good = false;
+    if (!check_exact(log, source->file)) {
+        return false;
     }
-    set_directions(log);
-    if (good && !sim_replay_set_clock(log, tick_ms)) {
+    if (!sim_replay_set_clock(log, source->tick_ms)) {
         fprintf(stderr, "taper-sim: %s: no CTRL_STATUS (id 240) of the station: no control tick to replay\n",
-                file);
-        good = false;
+                source->file);
+        return false;
     }
-    return good;
+    return true;
+}
+
+bool sim_replay_load(sim_replay_log_t *log, const sim_replay_source_t *source) {
+    *log = (sim_replay_log_t){
+        .exact = source->exact, .start_us = source->start_us, .interfaces = source->name_count};
+    for (unsigned i = 0; i < source->name_count; i++) {
+        (void)snprintf(log->interface[i], sizeof log->interface[0], "%s", source->names[i]);
+    }
+    FILE *stream = fopen(source->file, "r");
+    if (stream == NULL) {
+        fprintf(stderr, "taper-sim: %s: %s\n", source->file, strerror(errno));
+        return false;
+    }
+    const bool good = read_lines(log, stream, source->file, source->name_count > 0);
+    (void)fclose(stream);
+    return good && put_on_clock(log, source);
 }
 
 void sim_replay_free(sim_replay_log_t *log) {

@@ -6,10 +6,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "replay.h"
 #include "taper/frame.h"
-
-/** Interfaces that can be named. */
-#define SIM_REPLAY_BUSES 4
 
 typedef struct {
     uint64_t time_us; /**< in the file */
@@ -18,13 +16,24 @@ typedef struct {
     bool sent; /**< by the station */
 } sim_replay_frame_t;
 
+/** Where a log comes from. */
+typedef struct {
+    const char *file;
+    const char *const *names; /**< [name_count] interfaces that are the station's buses, in order */
+    unsigned name_count;      /**< 0: by their first appearance */
+    unsigned buses;           /**< of the station */
+    uint32_t tick_ms;
+    bool exact;        /**< the station's own recording, in whole milliseconds from `start_us` on */
+    uint64_t start_us; /**< station time 0, if `exact` */
+} sim_replay_source_t;
+
 typedef struct {
     sim_replay_frame_t *frame; /**< as they stand in the file */
     size_t count, room;
-    bool exact;        /**< the station's own recording: whole milliseconds, R or T on every line */
-    uint64_t start_us; /**< station time 0 in the file */
-    uint64_t end_ms;   /**< time of the last frame that the station sent */
-    uint64_t stop_ms;  /**< when it was stopped; UINT64_MAX: it was not */
+    bool exact;                           /**< the station's own recording */
+    uint64_t start_us;                    /**< station time 0 in the file */
+    uint64_t end_ms;                      /**< time of the last frame that the station sent */
+    uint64_t stop_ms;                     /**< when it was stopped; UINT64_MAX: it was not */
     char interface[SIM_REPLAY_BUSES][16]; /**< [bus] */
     unsigned interfaces;
 } sim_replay_log_t;
@@ -37,12 +46,9 @@ bool sim_replay_is_status(const taper_frame_t *frame);
 
 /**
  * Read a CAN log, and find the station's clock in it.
- * @param names [name_count] interfaces that are the station's buses, in order; none: by their first appearance
- * @param buses of the station
  * @return false, after one line on stderr, for a file that cannot be read or replayed.
  */
-bool sim_replay_load(sim_replay_log_t *log, const char *file, const char *const *names, unsigned name_count,
-                     unsigned buses, uint32_t tick_ms);
+bool sim_replay_load(sim_replay_log_t *log, const sim_replay_source_t *source);
 
 void sim_replay_free(sim_replay_log_t *log);
 

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "curve.h"
 #include "fleet.h"
 #include "gateway.h"
 #include "memory.h"
@@ -16,6 +17,8 @@
 
 /** A decrease pays for an increase in the next round; more than a few are not needed. */
 #define HAND_OVER_ROUNDS 6
+/** The longest curve takes some 1000. */
+#define CURVE_ROUNDS 5000
 
 typedef struct {
     const sim_case_t *run;
@@ -29,6 +32,8 @@ typedef struct {
     taper_station_t station;
     sim_fleet_t fleet;
     sim_gateway_t gateway;
+    sim_curve_t curve;
+    uint32_t curve_ms; /**< its clock, which counts rounds */
     sim_queue_t queue;
     uint64_t random;                        /**< state of next_random() */
     uint8_t turn[TAPER_MAX_CONNECTORS + 1]; /**< nodes in the order of sending; the last is the gateway */
@@ -141,11 +146,43 @@ static bool hand_over(world_t *world, uint32_t now_ms) {
     return sent;
 }
 
+/** Frames go to the gateway, or to their connectors. */
+static void pass_on_frames(world_t *world) {
+    taper_frame_t frame;
+    while (taper_membus_world_receive(&world->bus, &frame)) {
+        if (!sim_curve_take(&world->curve, &frame, world->curve_ms)) {
+            sim_fleet_take(&world->fleet, &frame);
+        }
+    }
+}
+
+/**
+ * The gateway tells the course of the limit, if it is due. For the station no time passes; the gateway takes a round for a
+ * millisecond, and so keeps the gap between frames that the station asks for.
+ * @return whether the station knows it now.
+ */
+static bool tell_curve(world_t *world, int64_t now_s, uint32_t now_ms) {
+    taper_frame_t frame;
+    for (unsigned round = 0; round < CURVE_ROUNDS && !sim_curve_is_settled(&world->curve, (double)now_s);
+         round++) {
+        world->curve_ms++;
+        if (sim_curve_next(&world->curve, (double)now_s, world->curve_ms, &frame) &&
+            taper_membus_world_send(&world->bus, &frame)) {
+            sim_curve_sent(&world->curve, world->curve_ms);
+            taper_station_poll(&world->station, now_ms); // it never speaks unless it is spoken to
+            pass_on_frames(world);
+        }
+    }
+    return sim_curve_is_settled(&world->curve, (double)now_s);
+}
+
 static bool run_tick(world_t *world, int64_t now_s) {
     const uint32_t now_ms = (uint32_t)((uint64_t)now_s * 1000U);
     taper_membus_set_time(&world->bus, now_ms);
     sim_queue_advance(&world->queue, now_s);
-    if (!sim_gateway_publish(&world->gateway, &world->station, now_s) || !send_reports(world, now_s)) {
+    const bool reported = send_reports(world, now_s);
+    sim_fleet_begin(&world->fleet);
+    if (!reported || !tell_curve(world, now_s, now_ms)) {
         fprintf(stderr,
                 "taper-sim: internal error at %lld s: the station or the bus refused what it was sent\n",
                 (long long)now_s);
@@ -153,7 +190,7 @@ static bool run_tick(world_t *world, int64_t now_s) {
     }
     taper_station_step(&world->station, now_ms);
     note_solve(world);
-    sim_fleet_listen(&world->fleet);
+    sim_fleet_hear(&world->fleet);
     if (!hand_over(world, now_ms)) {
         return false;
     }
@@ -195,6 +232,7 @@ bool sim_world_run(const sim_case_t *run, sim_results_t *results) {
     world->world_port = taper_membus_world_port(&world->bus);
     sim_fleet_init(&world->fleet, run->station, &world->world_port, run->policy->tells_taper, run->seed);
     sim_gateway_init(&world->gateway, run->limits, &world->world_port, world->tick_s, run->seed);
+    sim_curve_init(&world->curve, run->limits);
     sim_queue_init(&world->queue, run->sessions, world->fleet.evse, run->station->connector_count,
                    results->outcome);
     bool good = init_station(world);

@@ -130,3 +130,22 @@ def test_unknown_columns_of_a_limit_file_are_ignored_with_a_warning(sim):
     run = sim.run(CROWD, "--limit-csv", "limit.csv")
     assert run.code == 0
     assert run.stderr == "limit.csv:1: why: warning: unknown column, ignored\n"
+
+
+def test_a_plan_counts_on_a_rise_that_is_known_ahead(planning_sim):
+    """4 kW for two hours, then 22: the slow car cannot catch up then, the fast one can, though it leaves earlier."""
+    slow = session("slow", battery_kwh=80, soc_arrival=0.5, soc_target=0.65, max_kw=3.7, taper_kw=0)
+    fast = session("fast", departure_s=3 * 3600, battery_kwh=80, soc_arrival=0.5, soc_target=0.7, max_kw=22, taper_kw=0)
+    planning_sim.write("rise.csv", "time_s,limit_kw\n0,4\n7200,22\n")
+
+    def slow_at_the_rise(run):
+        assert run.code == 0
+        return {row["time_s"]: float(row["soc"]) for row in run.of_session("slow")}["7200"]
+
+    known = planning_sim.run([slow, fast], "--limit-csv", "rise.csv", *ANY_CURRENT, policy="soc-mpc", out="known")
+    never = planning_sim.run([slow, fast], "--limit-kw", "4", *ANY_CURRENT, policy="soc-mpc", out="never")
+    assert slow_at_the_rise(known) > 0.58  # 3.7 kW all the time: 0.5925
+    assert slow_at_the_rise(never) < 0.51
+    assert known.summary["satisfied"] == 2
+    blind = planning_sim.run([slow, fast], "--limit-csv", "rise.csv", *ANY_CURRENT, policy="edf", out="blind")
+    assert blind.summary["satisfied"] == 1

@@ -1,4 +1,4 @@
-/* A wall clock that jumps, or was never set: faults 26 to 28 of docs/protocol.md. */
+/* A wall clock that jumps, or was never set, and frames of another time: faults 10 and 26 to 28 of docs/protocol.md. */
 #include <string.h>
 
 #include "station_bench.h"
@@ -115,6 +115,32 @@ static void test_row_28_without_a_clock_deadlines_count_from_plug_in(void) {
     TEST_ASSERT_EQUAL_INT32(7200 - 7, bench.station.snapshot.demand[0].departs_in_s);
 }
 
+static void test_row_10_frames_that_waited_too_long_in_a_queue_are_no_sign_of_life(void) {
+    bench_send_status(1, true);
+    bench_send_vehicle(1, 7, 500);
+    bench.now_ms += TAPER_EVSE_STATUS_TIMEOUT_ms + 1; /* nobody took them out */
+    bench_send_limit(50000);
+    for (uint8_t node = 2; node <= 8; node++) {
+        bench_send_status(node, node == 2);
+    }
+    bench_send_vehicle(2, 8, 600);
+    bench_step();
+    TEST_ASSERT_EQUAL(TAPER_REASON_OFFLINE, taper_station_reason(&bench.station, 0));
+    TEST_ASSERT_EQUAL_UINT(1, bench_events(TAPER_EVENT_CONNECTOR_LOST));
+    TEST_ASSERT_EQUAL_INT32(0, bench_setpoint_for(1).current_mA);
+    TEST_ASSERT_GREATER_THAN_INT32(0, bench_setpoint_for(2).current_mA);
+    tick();
+    TEST_ASSERT_EQUAL_UINT(1, bench_events(TAPER_EVENT_CONNECTOR_BACK));
+}
+
+static void test_row_10_a_limit_that_waited_too_long_in_a_queue_does_not_hold(void) {
+    bench_send_limit(50000);
+    bench.now_ms += TAPER_SITE_LIMIT_TIMEOUT_ms + 1;
+    bench_step();
+    TEST_ASSERT_EQUAL(TAPER_MODE_FAILSAFE, taper_station_mode(&bench.station));
+    TEST_ASSERT_EQUAL_INT32(11000, taper_station_site_limit_W(&bench.station));
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_row_26_a_clock_that_jumps_ahead_by_an_hour_moves_departures_and_nothing_else);
@@ -122,5 +148,7 @@ int main(void) {
     RUN_TEST(test_row_26_drift_of_some_seconds_is_no_jump);
     RUN_TEST(test_row_27_timeouts_run_on_while_the_clock_goes_back);
     RUN_TEST(test_row_28_without_a_clock_deadlines_count_from_plug_in);
+    RUN_TEST(test_row_10_frames_that_waited_too_long_in_a_queue_are_no_sign_of_life);
+    RUN_TEST(test_row_10_a_limit_that_waited_too_long_in_a_queue_does_not_hold);
     return UNITY_END();
 }

@@ -68,7 +68,7 @@ def sums(scene, nodes, since_s):
     return found
 
 
-def test_11_a_connector_that_falls_silent_keeps_its_reservation_until_it_has_expired(scene):
+def test_row_11_a_connector_that_falls_silent_keeps_its_reservation_until_it_has_expired(scene):
     scene.hold(scene.alone)
     silent_s = scene.bus.last(EVSE_STATUS, ALONE).time_s
     scene.station.wait_for(f"event=connector_lost bus=0 node={ALONE}")
@@ -86,7 +86,7 @@ def test_11_a_connector_that_falls_silent_keeps_its_reservation_until_it_has_exp
     scene.wait_until_charging(back_s)
 
 
-def test_10_delayed_frames_count_when_they_come_and_silence_before_as_a_timeout(scene):
+def test_row_10_delayed_frames_count_when_they_come_and_silence_before_as_a_timeout(scene):
     delay_s = 2.0
     with medium("netem", "delay", f"{delay_s:g}s", "limit", "100000"):
         began_s = time.time()
@@ -100,7 +100,7 @@ def test_10_delayed_frames_count_when_they_come_and_silence_before_as_a_timeout(
 
 
 @pytest.mark.parametrize("way", ["bus-off", "interface down"])
-def test_17_off_the_bus_it_sends_nothing_and_comes_back_by_itself(scene, way):
+def test_row_17_off_the_bus_it_sends_nothing_and_comes_back_by_itself(scene, way):
     began_s = time.time()
     if way == "bus-off":
         scene.inject(ERROR_BUSOFF)
@@ -118,7 +118,7 @@ def test_17_off_the_bus_it_sends_nothing_and_comes_back_by_itself(scene, way):
     scene.wait_until_charging()
 
 
-def test_18_on_a_bus_that_takes_no_frames_it_gives_up_and_what_comes_later_is_new(scene):
+def test_row_18_on_a_bus_that_takes_no_frames_it_gives_up_and_what_comes_later_is_new(scene):
     with medium("tbf", "rate", "1kbit", "burst", "100", "limit", "1mb"):
         blocked_s = time.time()
         scene.station.wait_for("event=send_blocked")
@@ -131,7 +131,7 @@ def test_18_on_a_bus_that_takes_no_frames_it_gives_up_and_what_comes_later_is_ne
         assert {(second - first) % 16 for first, second in pairwise(counters)} <= {1}
 
 
-def test_13_and_14_a_silent_gateway_means_failsafe_until_there_is_a_limit_again(scene):
+def test_row_13_and_14_a_silent_gateway_means_failsafe_until_there_is_a_limit_again(scene):
     scene.gateway.says = None
     last_s = scene.bus.last(SITE_LIMIT, GATEWAY).time_s
     failsafe = scene.bus.first(last_s, CTRL_STATUS, lambda frame: frame.data[1] >> 4 == FAILSAFE, "failsafe", {0})
@@ -149,7 +149,7 @@ def test_13_and_14_a_silent_gateway_means_failsafe_until_there_is_a_limit_again(
     wait_until(lambda: sum(scene.told_dA().values()) * W_PER_dA > FAILSAFE_W, "more than the failsafe limit")
 
 
-def test_20_two_controllers_stop_charging_and_the_one_that_stays_resumes(scene):
+def test_row_20_two_controllers_stop_charging_and_the_one_that_stays_resumes(scene):
     second = scene.start_station()
     scene.station.wait_for("event=two_controllers")
     second.wait_for("event=two_controllers")
@@ -164,7 +164,7 @@ def test_20_two_controllers_stop_charging_and_the_one_that_stays_resumes(scene):
     assert resumed.time_s - ended_s > 4  # the other may only be slow
 
 
-def test_12_without_a_controller_every_connector_falls_back_when_its_setpoint_ends(scene):
+def test_row_12_without_a_controller_every_connector_falls_back_when_its_setpoint_ends(scene):
     scene.station.process.send_signal(signal.SIGKILL)
     scene.station.process.wait(PATIENCE_S)
     for node in NODES:
@@ -174,7 +174,7 @@ def test_12_without_a_controller_every_connector_falls_back_when_its_setpoint_en
         assert [frame.time_s for frame in scene.bus.since(last_s, SETPOINT, {node})] == [last_s]
 
 
-def test_29_a_controller_that_is_back_charges_within_ten_seconds_and_not_before_it_knows_the_limit(scene):
+def test_row_29_a_controller_that_is_back_charges_within_ten_seconds_and_not_before_it_knows_the_limit(scene):
     began_s = time.time()
     scene.station = scene.start_station()
     charging = scene.bus.first(began_s, SETPOINT, lambda frame: frame.told_dA() > 0, "charging")

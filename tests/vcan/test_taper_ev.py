@@ -124,6 +124,14 @@ def test_it_waits_for_a_controller_and_plays_the_station_that_it_finds(beside):
     assert {row["connector"] for row in beside.read_csv("out", "connectors.csv")} == {"1", "5"}
 
 
+def test_the_station_is_told_the_course_of_the_limit(beside):
+    (beside.folder / "limit.csv").write_text("time_s,limit_kw\n0,20\n39600,5\n41400,20\n")
+    station = beside.station()
+    ev = beside.ev("--limit-csv", "limit.csv")
+    station.wait_for(r" event=curve_set .*points=3\b")
+    assert ev.finish() == 0
+
+
 def test_two_processes_share_one_field(beside):
     write_sessions(beside.folder, [(TWO_HOURS[0][0], 2, *TWO_HOURS[0][2:]), TWO_HOURS[1]])
     beside.station()

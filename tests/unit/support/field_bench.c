@@ -91,8 +91,10 @@ void field_run_ms(uint32_t ms) {
         taper_frame_t frame;
         uint32_t frames = 0;
         while (at.station_port.receive(at.station_port.context, &frame)) {
-            note(&frame);
-            frames++;
+            if (frame.id >> 6 != TAPER_MESSAGE_ISOTP_FROM) { /* its frames are not protected one by one */
+                note(&frame);
+                frames++;
+            }
         }
         at.most_in_a_poll = frames > at.most_in_a_poll ? frames : at.most_in_a_poll;
     }

@@ -44,7 +44,7 @@ sim_field_options_t field_options(void);
 void field_start(const sim_field_options_t *options, const sim_session_t *sessions, size_t count);
 void field_end(void);
 
-/** Let time pass, a multiple of POLL_ms. Every frame is checked and logged. */
+/** Let time pass, a multiple of POLL_ms. Every frame is checked and logged, but those of ISO-TP. */
 void field_run_ms(uint32_t ms);
 
 /** Forget what was logged. */

@@ -88,7 +88,7 @@ typedef struct {
     void *clock_context;
     taper_frame_t queue[TAPER_SOCKETCAN_QUEUE];
     uint32_t head, tail; /**< free-running */
-    bool dry;            /**< the kernel had no more when the queue was last filled: the next "empty" needs no look */
+    bool dry; /**< the kernel had no more when the queue was last filled: the next "empty" needs no look */
 } taper_socketcan_t;
 
 /**
