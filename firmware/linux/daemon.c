@@ -75,16 +75,15 @@ static uint32_t station_ms(void *context) {
  */
 static void sleep_until(const daemon_t *daemon, uint64_t due_ms, bool stoppable) {
     const uint64_t due_us = daemon->start_us + due_ms * 1000;
-    for (;;) {
+    uint64_t left_us;
+    do {
         const uint64_t steady_us = taper_board_steady_us();
-        if (steady_us >= due_us || (stoppable && stop_asked)) {
-            return;
-        }
-        const uint64_t left_us = due_us - steady_us;
+        left_us = due_us > steady_us ? due_us - steady_us : 0;
         const struct timespec left = {.tv_sec = (time_t)(left_us / 1000000),
                                       .tv_nsec = (long)(left_us % 1000000) * 1000};
+        // With nothing left, too: a daemon that is always late must still hear that it should stop.
         (void)ppoll(NULL, 0, &left, stoppable ? &daemon->awake_mask : NULL);
-    }
+    } while (left_us > 0 && !(stoppable && stop_asked));
 }
 
 static bool fail(const char *what, const char *reason) {

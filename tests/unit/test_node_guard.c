@@ -75,11 +75,39 @@ static void test_a_node_that_comes_back_after_a_turn_of_the_clock_is_heard(void)
     TEST_ASSERT_TRUE(taper_session_is_online(&bench.station.sessions, NODE - 1, bench.now_ms - 1000u));
 }
 
+static void test_frames_that_are_bad_now_and_then_do_not_fill_the_log(void) {
+    for (unsigned k = 0; k < 150; k++) { /* three bad, four good: the node is lost, and is back */
+        taper_frame_t frame = {.id = TAPER_MESSAGE_EVSE_ELEC << 6 | NODE, .length = TAPER_FRAME_LENGTH};
+        taper_e2e_protect(&frame, (uint8_t)k);
+        frame.data[7] ^= k % 7 < 3 ? 0x55u : 0u;
+        taper_membus_set_time(&bench.bus, bench.now_ms);
+        TEST_ASSERT_TRUE(taper_membus_world_send(&bench.bus, &frame));
+        bench_poll(200);
+    }
+    TEST_ASSERT_EQUAL_UINT(1, bench_events(TAPER_EVENT_BAD_FRAMES));
+}
+
+static void test_transfers_that_are_refused_again_and_again_do_not_fill_the_log(void) {
+    const taper_frame_t garbage = {.id = TAPER_MESSAGE_ISOTP_FROM << 6 | TAPER_NODE_GATEWAY,
+                                   .length = TAPER_FRAME_LENGTH,
+                                   .data = {4, 0xDE, 0xAD, 0xBE, 0xEF}};
+    for (unsigned k = 0; k < 90; k++) {
+        taper_membus_set_time(&bench.bus, bench.now_ms);
+        TEST_ASSERT_TRUE(taper_membus_world_send(&bench.bus, &garbage));
+        bench_poll(1000);
+    }
+    TEST_ASSERT_GREATER_OR_EQUAL_UINT32(
+        90, taper_station_counter(&bench.station, TAPER_COUNTER_TRANSFERS_REFUSED));
+    TEST_ASSERT_EQUAL_UINT(2, bench_events(TAPER_EVENT_TRANSFER_REFUSED));
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_times_that_go_back_do_not_hide_a_node_that_babbles);
     RUN_TEST(test_times_that_go_back_do_not_make_a_node_babble);
     RUN_TEST(test_a_node_with_several_lasting_conditions_does_not_fill_the_log);
     RUN_TEST(test_a_node_that_comes_back_after_a_turn_of_the_clock_is_heard);
+    RUN_TEST(test_frames_that_are_bad_now_and_then_do_not_fill_the_log);
+    RUN_TEST(test_transfers_that_are_refused_again_and_again_do_not_fill_the_log);
     return UNITY_END();
 }

@@ -132,6 +132,13 @@ def test_sigterm_tells_every_connector_three_times_to_pause_with_no_fallback_cur
     assert running.lines[-1].endswith("event=stop reason=signal")
 
 
+def test_sigterm_ends_a_daemon_that_is_late_with_every_call(station):
+    running = station(before=("env", f"LD_PRELOAD={program('TAPER_LATE_CLOCK')}"))
+    running.wait_for("event=overrun")
+    assert end(running) == 0
+    assert running.lines[-1].endswith("event=stop reason=signal")
+
+
 def test_sigint_stops_it_too_and_sighup_does_not(station):
     running = station()
     running.wait_for("event=started")

@@ -13,9 +13,6 @@
 #define GATEWAY_NOMINAL 3u
 #define TOO_MUCH        3u
 
-/** The log takes this long to hear of the same trouble of the same node again. */
-#define SAME_TROUBLE_ms UINT32_C(60000)
-
 /** Who sent a frame, and what its receiver remembers of it. */
 typedef struct {
     taper_node_guard_t *guard;
@@ -68,9 +65,9 @@ static bool find_sender(taper_station_t *station, const taper_frame_t *frame, se
     return true;
 }
 
-static void note_bad_frames(taper_station_t *station, const taper_frame_t *frame, bool was_valid) {
+static void note_bad_frames(taper_station_t *station, taper_trouble_t *trouble, const taper_frame_t *frame) {
     const uint8_t node = (uint8_t)(frame->id & 0x3Fu);
-    if (was_valid) {
+    if (taper_trouble_is_news(trouble, frame->time_ms)) {
         taper_event_note(&station->events, TAPER_EVENT_BAD_FRAMES, frame->bus, node, frame->id >> 6);
     }
     taper_alarm_raise(station, TAPER_EVENT_BAD_FRAMES, frame->bus, node, station->events.now_ms);
@@ -89,15 +86,15 @@ static taper_counter_t counter_of(taper_e2e_check_t check) {
 }
 
 /** Whether a frame is sound, new, and of a sender that is to be believed. */
-static bool is_good(taper_station_t *station, taper_e2e_receiver_t *receiver, const taper_frame_t *frame) {
-    const bool was_valid = taper_e2e_is_valid(receiver);
+static bool is_good(taper_station_t *station, const sender_t *sender, const taper_frame_t *frame) {
+    taper_e2e_receiver_t *receiver = sender->receiver;
     const taper_e2e_check_t check = taper_e2e_check(receiver, frame);
     const taper_counter_t counter = counter_of(check);
     if (counter != TAPER_COUNTERS) {
         taper_station_count(station, counter);
     }
     if (!taper_e2e_is_valid(receiver)) {
-        note_bad_frames(station, frame, was_valid);
+        note_bad_frames(station, &sender->guard->bad_frames, frame);
     }
     if (check != TAPER_E2E_OK && check != TAPER_E2E_OK_SOME_LOST) {
         return false;
@@ -110,11 +107,8 @@ static bool is_good(taper_station_t *station, taper_e2e_receiver_t *receiver, co
 }
 
 static void note_bad_field(taper_station_t *station, const sender_t *sender, const taper_frame_t *frame) {
-    taper_node_guard_t *guard = sender->guard;
     taper_station_count(station, TAPER_COUNTER_BAD_FIELDS);
-    if (!guard->bad_field_noted || taper_elapsed_ms(frame->time_ms, guard->bad_field_ms) >= SAME_TROUBLE_ms) {
-        guard->bad_field_noted = true;
-        guard->bad_field_ms = frame->time_ms;
+    if (taper_trouble_is_news(&sender->guard->bad_field, frame->time_ms)) {
         taper_event_note(&station->events, TAPER_EVENT_BAD_FIELD, frame->bus, (uint8_t)(frame->id & 0x3Fu),
                          frame->id >> 6);
     }
@@ -125,7 +119,7 @@ static bool emcy_is_news(taper_node_guard_t *guard, uint16_t code, uint32_t at_m
     taper_emcy_note_t *place = NULL;
     for (unsigned k = 0; k < TAPER_EMCYS_OF_NODE; k++) {
         taper_emcy_note_t *note = &guard->emcy[k];
-        const bool lately = note->noted && taper_elapsed_ms(at_ms, note->at_ms) < SAME_TROUBLE_ms;
+        const bool lately = note->noted && taper_elapsed_ms(at_ms, note->at_ms) < TAPER_SAME_TROUBLE_ms;
         if (lately && note->code == code) {
             return false;
         }
@@ -229,7 +223,7 @@ static void take_report(taper_station_t *station, taper_frame_t *frame) {
     frame->time_ms = taper_node_guard_time(sender.guard, frame->time_ms, station->events.now_ms);
     const uint32_t most_per_second = TOO_MUCH * (sender.connector < 0 ? GATEWAY_NOMINAL : CONNECTOR_NOMINAL);
     if (!taper_node_guard_passes(station, sender.guard, most_per_second, frame) ||
-        !is_good(station, sender.receiver, frame)) {
+        !is_good(station, &sender, frame)) {
         return;
     }
     const bool usable = taper_decode(frame, &message, &bad_field);

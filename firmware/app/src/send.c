@@ -160,9 +160,10 @@ void taper_station_send_display(taper_station_t *station, uint32_t now_ms) {
     send_diag(station, now_ms);
 }
 
-static void note_transfers(taper_station_t *station) {
+static void note_transfers(taper_station_t *station, uint32_t now_ms) {
     uint32_t *count = station->counters.count;
-    if (station->transfers.refused != count[TAPER_COUNTER_TRANSFERS_REFUSED]) {
+    if (station->transfers.refused != count[TAPER_COUNTER_TRANSFERS_REFUSED] &&
+        taper_trouble_is_news(&station->refused_transfers, now_ms)) {
         taper_event_note(&station->events, TAPER_EVENT_TRANSFER_REFUSED, 0, 0,
                          taper_saturate_i32(station->transfers.refused));
     }
@@ -178,5 +179,5 @@ void taper_station_send_transfers(taper_station_t *station, uint32_t now_ms) {
             taper_transfers_sent(&station->transfers, &frame, now_ms);
         }
     }
-    note_transfers(station);
+    note_transfers(station, now_ms);
 }

@@ -8,6 +8,18 @@ static inline void taper_station_count(taper_station_t *station, taper_counter_t
     taper_count(&station->counters.count[counter]);
 }
 
+/** The log takes this long to hear of the same trouble of the same node again. */
+#define TAPER_SAME_TROUBLE_ms UINT32_C(60000)
+
+/** Whether the log should hear of trouble at `now_ms`; it then counts as noted. */
+static inline bool taper_trouble_is_news(taper_trouble_t *trouble, uint32_t now_ms) {
+    if (trouble->noted && taper_elapsed_ms(now_ms, trouble->at_ms) < TAPER_SAME_TROUBLE_ms) {
+        return false;
+    }
+    *trouble = (taper_trouble_t){.noted = true, .at_ms = now_ms};
+    return true;
+}
+
 /* receive.c */
 
 /** Drain the port's receive queue into session table, limits, ledger and transfers. */

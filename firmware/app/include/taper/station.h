@@ -63,6 +63,12 @@ typedef struct {
     uint32_t count[TAPER_COUNTERS];
 } taper_station_counters_t;
 
+/** Trouble that may come with every frame: when it was last noted in the log. */
+typedef struct {
+    bool noted;
+    uint32_t at_ms;
+} taper_trouble_t;
+
 /** Codes of a node's EMCY that are told apart in the log; more of them in a minute are not noted. */
 #define TAPER_EMCYS_OF_NODE 4
 
@@ -82,8 +88,7 @@ typedef struct {
     bool in_excess, babbling;
     bool known; /**< heard before: the tokens count */
     taper_emcy_note_t emcy[TAPER_EMCYS_OF_NODE];
-    bool bad_field_noted; /**< at `bad_field_ms`: the log is not for every frame */
-    uint32_t bad_field_ms;
+    taper_trouble_t bad_field, bad_frames;
 } taper_node_guard_t;
 
 /** One CAN bus of the station, as a sender sees it. */
@@ -124,6 +129,7 @@ typedef struct {
     taper_ledger_t ledger;
     taper_transfers_t transfers;
     taper_limit_curve_t incoming_curve; /**< being taken over from a transfer */
+    taper_trouble_t refused_transfers;
     taper_event_log_t events;
     taper_e2e_receiver_t connector_e2e[TAPER_MAX_CONNECTORS][TAPER_CONNECTOR_RECEIVERS];
     taper_e2e_receiver_t gateway_e2e[TAPER_GATEWAY_RECEIVERS];
