@@ -1,4 +1,4 @@
-#define _GNU_SOURCE // PATH_MAX
+#define _GNU_SOURCE // PATH_MAX, strsep
 
 #include "companion.h"
 
@@ -30,8 +30,9 @@ enum {
     KEY_PLANNER,
     KEY_START,
     KEY_BUS,
-    KEYS = KEY_BUS + TAPER_COMPANION_BUSES,
 };
+
+#define KEYS (KEY_BUS + TAPER_COMPANION_BUSES)
 
 static const char *const names[KEYS] = {
     [KEY_FORMAT] = "format",       [KEY_VERSION] = "version",
@@ -103,10 +104,17 @@ static bool refuse_value(const reader_t *reader, unsigned key, const char *expec
     return refuse(reader, reader->line[key], names[key], "not %s: '%.40s'", expected, reader->value[key]);
 }
 
+static bool refuse_missing(const reader_t *reader, unsigned key) {
+    return refuse(reader, reader->lines + 1, names[key], "missing");
+}
+
 static bool whole(const reader_t *reader, unsigned key, uint64_t low, uint64_t high, uint64_t *value) {
     const char *text = reader->value[key];
     char *end = NULL;
     char expected[80];
+    if (text == NULL) {
+        return refuse_missing(reader, key);
+    }
     errno = 0;
     *value = strtoull(text, &end, 10);
     if (text[0] >= '0' && text[0] <= '9' && *end == '\0' && errno == 0 && *value >= low && *value <= high) {
@@ -154,23 +162,9 @@ static bool take_line(reader_t *reader, char *text) {
 }
 
 static bool take_lines(reader_t *reader, char *text) {
-    while (*text != '\0') {
-        char *end = text + strcspn(text, "\n");
-        char *next = *end == '\n' ? end + 1 : end;
-        *end = '\0';
-        if (!take_line(reader, text)) {
+    while (text != NULL && *text != '\0') {
+        if (!take_line(reader, strsep(&text, "\n"))) {
             return false;
-        }
-        text = next;
-    }
-    return true;
-}
-
-/** All but those of buses, which depend on the station. */
-static bool check_complete(const reader_t *reader) {
-    for (unsigned key = 0; key < KEY_BUS; key++) {
-        if (reader->value[key] == NULL) {
-            return refuse(reader, reader->lines + 1, names[key], "missing");
         }
     }
     return true;
@@ -179,6 +173,9 @@ static bool check_complete(const reader_t *reader) {
 /** Something of at most `size` - 1 characters. */
 static bool read_word(const reader_t *reader, unsigned key, char *word, size_t size) {
     const char *text = reader->value[key];
+    if (text == NULL) {
+        return refuse_missing(reader, key);
+    }
     if (text[0] == '\0' || strlen(text) >= size || strpbrk(text, " \t\r") != NULL) {
         return refuse_value(reader, key, key == KEY_VERSION ? "a version" : "the name of an interface");
     }
@@ -187,6 +184,9 @@ static bool read_word(const reader_t *reader, unsigned key, char *word, size_t s
 }
 
 static bool read_station(const reader_t *reader, taper_companion_t *companion) {
+    if (reader->value[KEY_STATION] == NULL) {
+        return refuse_missing(reader, KEY_STATION);
+    }
     companion->station = taper_argument_find_station(reader->value[KEY_STATION]);
     if (companion->station < taper_station_count) {
         return true;
@@ -200,6 +200,9 @@ static bool read_station(const reader_t *reader, taper_companion_t *companion) {
 }
 
 static bool read_planner(const reader_t *reader, taper_companion_t *companion) {
+    if (reader->value[KEY_PLANNER] == NULL) {
+        return refuse_missing(reader, KEY_PLANNER);
+    }
     companion->planner = strcmp(reader->value[KEY_PLANNER], "yes") == 0;
     if (!companion->planner && strcmp(reader->value[KEY_PLANNER], "no") != 0) {
         return refuse_value(reader, KEY_PLANNER, "yes or no");
@@ -245,15 +248,12 @@ static bool read_buses(const reader_t *reader, taper_companion_t *companion) {
     companion->buses = taper_setup_buses(station);
     for (unsigned i = 0; i < TAPER_COMPANION_BUSES; i++) {
         const unsigned key = KEY_BUS + i;
-        if (reader->value[key] == NULL && i < companion->buses) {
-            return refuse(reader, reader->lines + 1, names[key], "missing");
-        }
-        if (reader->value[key] != NULL && i >= companion->buses) {
+        if (i < companion->buses) {
+            if (!read_word(reader, key, companion->interface[i], sizeof companion->interface[i])) {
+                return false;
+            }
+        } else if (reader->value[key] != NULL) {
             return refuse(reader, reader->line[key], names[key], "station %s has no such bus", station->name);
-        }
-        if (reader->value[key] != NULL &&
-            !read_word(reader, key, companion->interface[i], sizeof companion->interface[i])) {
-            return false;
         }
     }
     return true;
@@ -262,7 +262,7 @@ static bool read_buses(const reader_t *reader, taper_companion_t *companion) {
 bool taper_companion_parse(char *text, taper_companion_t *companion, char *reason, size_t reason_size) {
     reader_t reader = {.reason = reason, .reason_size = reason_size};
     memset(companion, 0, sizeof *companion);
-    return take_lines(&reader, text) && check_complete(&reader) &&
+    return take_lines(&reader, text) && (reader.lines > 0 || refuse_missing(&reader, KEY_FORMAT)) &&
            read_word(&reader, KEY_VERSION, companion->version, sizeof companion->version) &&
            read_station(&reader, companion) && read_limits(&reader, companion) &&
            read_times(&reader, companion) && read_planner(&reader, companion) &&
@@ -295,7 +295,7 @@ static const char *read_text(FILE *stream, char text[TAPER_COMPANION_TEXT]) {
 
 taper_companion_verdict_t taper_companion_read(const char *recording, taper_companion_t *companion,
                                                char *reason, size_t reason_size) {
-    char text[TAPER_COMPANION_TEXT];
+    char text[TAPER_COMPANION_TEXT] = "";
     char file[PATH_MAX];
     char why[256];
     if ((size_t)snprintf(file, sizeof file, "%s.station", recording) >= sizeof file) {

@@ -58,7 +58,9 @@ int sim_replay_set_up(sim_replay_setup_t *setup, const sim_replay_options_t *opt
     memset(setup, 0, sizeof *setup);
     setup->setup = options->setup;
     setup->name_count = options->name_count;
-    memcpy(setup->names, options->names, sizeof setup->names);
+    for (unsigned i = 0; i < options->name_count; i++) {
+        setup->names[i] = options->names[i];
+    }
     const taper_companion_verdict_t verdict =
         taper_companion_read(options->file, &setup->companion, reason, sizeof reason);
     if (verdict == TAPER_COMPANION_BAD) {
