@@ -85,9 +85,9 @@ static void check_limits(const taper_station_t *station) {
 static void check_no_demand(const taper_demand_t *demand) {
     check_that(demand->stored_Wh == 0 && demand->capacity_Wh == 0 && demand->need_Wh == 0 &&
                    demand->peak_W == 0 && demand->taper_W == 0 && demand->max_mA == 0 &&
-                   demand->min_mA == 0 && demand->W_per_A == 0 && demand->booked_W_per_A == 0 &&
-                   demand->departs_in_s == 0,
-               "a demand that is not active, yet not zero", 1);
+                   demand->min_mA == 0 && demand->W_per_A == 0 && demand->booked_W_per_A > 0 &&
+                   demand->booked_W_per_A <= 3 * 6554 && demand->departs_in_s == 0,
+               "a demand that is not active, yet not zero or not booked", 1);
 }
 
 static void check_demand(const taper_connector_config_t *connector, const taper_demand_t *demand) {
