@@ -177,6 +177,19 @@ static void test_a_store_keeps_the_gateways_failsafe_limit_and_not_the_descripti
     TEST_ASSERT_EQUAL_INT32(lower.failsafe_W, bench.station.limits.failsafe_W);
 }
 
+static void test_increases_without_an_echo_leave_a_counter_for_the_decrease(void) {
+    bench.deaf = true;
+    taper_station_poll(&bench.station, now_ms); /* the ledger begins */
+    for (int32_t k = 0; k < 20; k++) {
+        now_ms += 20;
+        bench.station.setpoints.current_mA[0] = 6000 + 100 * k;
+        taper_station_send_setpoints(&bench.station, now_ms);
+    }
+    bench.station.setpoints.current_mA[0] = 0;
+    taper_station_send_setpoints(&bench.station, now_ms);
+    TEST_ASSERT_EQUAL_INT32(0, bench.station.sent_mA[0]);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_a_node_may_send_a_seconds_worth_at_once_and_no_frame_more);
@@ -190,5 +203,6 @@ int main(void) {
     RUN_TEST(test_the_event_log_keeps_the_newest);
     RUN_TEST(test_the_event_log_goes_on_when_its_count_wraps);
     RUN_TEST(test_a_store_keeps_the_gateways_failsafe_limit_and_not_the_descriptions);
+    RUN_TEST(test_increases_without_an_echo_leave_a_counter_for_the_decrease);
     return UNITY_END();
 }

@@ -9,6 +9,8 @@
 #define VALIDITY_MOST_ms 127000u
 /** Setpoints wait behind frames of transfers: a peer that asks for no gap gets no more than this at a time. */
 #define TRANSFER_FRAMES 8u
+/** Counters that increases without an echo leave for a decrease. */
+#define COUNTERS_KEPT 4u
 /** PLAN goes round all connectors in this many seconds. */
 #define PLAN_ROUND_s 8u
 
@@ -57,11 +59,20 @@ static taper_message_t setpoint_of(const taper_station_t *station, uint8_t i) {
     };
 }
 
+/** Whether a counter is free for this setpoint: while it is not, an older one with that counter may be in force. */
+static bool has_counter(const taper_station_t *station, uint8_t i) {
+    const uint8_t counter = station->setpoint_counter[i];
+    const bool increase = station->setpoints.current_mA[i] > taper_max_i32(station->sent_mA[i], 0);
+    const uint8_t last = (uint8_t)((counter + COUNTERS_KEPT) % TAPER_LEDGER_SETPOINTS);
+    return taper_ledger_can_send(&station->ledger, i, counter) &&
+           (!increase || taper_ledger_can_send(&station->ledger, i, last));
+}
+
 /** One setpoint, noted in the ledger before anybody can act on it. What was refused is tried again with the newest value. */
 static void send_setpoint(taper_station_t *station, uint8_t i, uint32_t now_ms) {
     const uint8_t counter = station->setpoint_counter[i];
     const taper_message_t message = setpoint_of(station, i);
-    if (!taper_ledger_can_send(&station->ledger, i, counter)) {
+    if (!has_counter(station, i)) {
         return;
     }
     if (taper_station_send_message(station, &message, &station->setpoint_counter[i], now_ms)) {
