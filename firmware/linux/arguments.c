@@ -1,4 +1,4 @@
-#define _GNU_SOURCE // open_memstream
+#define _GNU_SOURCE // asprintf, open_memstream
 
 #include "arguments.h"
 
@@ -59,4 +59,13 @@ char *taper_argument_station_names(void) {
         fprintf(stream, "%s%s", i == 0 ? "" : ", ", taper_stations[i]->name);
     }
     return stream != NULL && fclose(stream) == 0 ? names : NULL;
+}
+
+char *taper_argument_with_names(const char *text, char *names) {
+    char *longer = NULL;
+    if (names != NULL && asprintf(&longer, "%s: %s", text, names) < 0) {
+        longer = NULL;
+    }
+    free(names);
+    return longer != NULL ? longer : (char *)text;
 }

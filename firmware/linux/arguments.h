@@ -21,4 +21,7 @@ unsigned taper_argument_find_station(const char *name);
 /** The names of all stations, separated by commas. To be freed. */
 char *taper_argument_station_names(void);
 
+/** For argp's help filter: "TEXT: NAMES", to be freed by argp, or `text` itself without names. Frees `names`. */
+char *taper_argument_with_names(const char *text, char *names);
+
 #endif

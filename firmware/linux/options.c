@@ -1,5 +1,3 @@
-#define _GNU_SOURCE // asprintf
-
 #include "options.h"
 
 #include <stdio.h>
@@ -78,13 +76,7 @@ typedef struct {
 /** Add the names that this program knows to the help. */
 static char *add_names(int key, const char *text, void *input) {
     (void)input;
-    char *names = key == KEY_STATION ? taper_argument_station_names() : NULL;
-    char *longer = NULL;
-    if (names != NULL && asprintf(&longer, "%s: %s", text, names) < 0) {
-        longer = NULL;
-    }
-    free(names);
-    return longer != NULL ? longer : (char *)text;
+    return taper_argument_with_names(text, key == KEY_STATION ? taper_argument_station_names() : NULL);
 }
 
 static void add_interface(taper_options_t *chosen, const char *name, struct argp_state *state) {

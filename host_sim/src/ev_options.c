@@ -1,5 +1,3 @@
-#define _GNU_SOURCE // asprintf
-
 #include "ev_options.h"
 
 #include <argp.h>
@@ -82,13 +80,7 @@ _Static_assert(TAPER_MAX_TIME_SCALE == 1000, "the help says 1000");
 /** Add the names that this program knows to the help. */
 static char *add_names(int key, const char *text, void *input) {
     (void)input;
-    char *names = key == KEY_STATION ? taper_argument_station_names() : NULL;
-    char *longer = NULL;
-    if (names != NULL && asprintf(&longer, "%s: %s", text, names) < 0) {
-        longer = NULL;
-    }
-    free(names);
-    return longer != NULL ? longer : (char *)text;
+    return taper_argument_with_names(text, key == KEY_STATION ? taper_argument_station_names() : NULL);
 }
 
 static void add_interface(ev_options_t *chosen, const char *name, struct argp_state *state) {

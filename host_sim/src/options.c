@@ -1,4 +1,4 @@
-#define _GNU_SOURCE // asprintf
+#define _GNU_SOURCE // open_memstream
 
 #include "options.h"
 
@@ -110,12 +110,7 @@ static char *add_names(int key, const char *text, void *input) {
     char *names = key == KEY_POLICY    ? policy_names(true)
                   : key == KEY_STATION ? taper_argument_station_names()
                                        : NULL;
-    char *longer = NULL;
-    if (names != NULL && asprintf(&longer, "%s: %s", text, names) < 0) {
-        longer = NULL;
-    }
-    free(names);
-    return longer != NULL ? longer : (char *)text;
+    return taper_argument_with_names(text, names);
 }
 
 static void set_policy(sim_options_t *chosen, const char *name, struct argp_state *state) {

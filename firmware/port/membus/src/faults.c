@@ -68,7 +68,9 @@ static void release_overtaken(taper_membus_queue_t *queue, uint32_t held_before)
     uint32_t k = 0;
     for (uint32_t seen = 0; seen < held_before; seen++) {
         taper_membus_held_t *held = &injector->held[k];
-        if (held->wait_frames > 0 && --held->wait_frames == 0) {
+        const bool is_last = held->wait_frames == 1;
+        held->wait_frames -= held->wait_frames > 0 ? 1 : 0;
+        if (is_last) {
             release(queue, k);
         } else {
             k++;
