@@ -5,12 +5,13 @@
 /** Frames taken in one call: what all nodes send in three seconds. A babbling bus cannot hold the station up. */
 #define MAX_FRAMES (TAPER_MAX_CONNECTORS * 32u + 64u)
 
-/** Nominal frames a second, rounded up: EVSE_STATUS, EV_STATUS, EVSE_ELEC, EV_PARAM_A..D, EVSE_INFO; and the gateway's
-    SITE_LIMIT, SITE_METER, TIME_SYNC. Three times that is too much. */
-#define CONNECTOR_NOMINAL                                                    \
-    (1000u / TAPER_EVSE_STATUS_CYCLE_ms + 1000u / TAPER_EV_STATUS_CYCLE_ms + \
-     1000u / TAPER_EVSE_ELEC_CYCLE_ms + 4000u / TAPER_EV_PARAM_A_CYCLE_ms + 1u)
-#define GATEWAY_NOMINAL 3u
+/** Nominal frames a second, rounded up. What is also sent on change counts twice: a connector's EVSE_STATUS and
+    EV_PARAM_A..D, beside its EV_STATUS, EVSE_ELEC and EVSE_INFO; the gateway's SITE_LIMIT, beside SITE_METER and TIME_SYNC.
+    Three times that is too much. */
+#define CONNECTOR_NOMINAL                                                         \
+    (2u * 1000u / TAPER_EVSE_STATUS_CYCLE_ms + 1000u / TAPER_EV_STATUS_CYCLE_ms + \
+     1000u / TAPER_EVSE_ELEC_CYCLE_ms + 2u * 4000u / TAPER_EV_PARAM_A_CYCLE_ms + 1u)
+#define GATEWAY_NOMINAL 4u
 #define TOO_MUCH        3u
 
 /** Who sent a frame, and what its receiver remembers of it. */
