@@ -24,6 +24,7 @@ FAILSAFE_W = 11_000
 FAILSAFE = 3  # mode
 ABSENT = 0x8000
 WORLD_S = 1_790_000_000
+OLDEST_S = 30  # no frame is held back longer
 COLUMNS = "session_id,connector,arrival_s,departure_s,battery_kwh,soc_arrival,soc_target,max_kw,taper_kw"
 
 
@@ -76,12 +77,12 @@ class Recorder:
                     self.frames.append(Frame(message.timestamp, message.arbitration_id, bytes(message.data)))
 
     def since(self, time_s, function, nodes=NODES):
-        """Frames of one kind from a time on."""
+        """Frames of one kind from a time on. A medium that delays frames hands on some with an older time."""
         found = []
         for frame in reversed(self.frames):
-            if frame.time_s < time_s:
+            if frame.time_s < time_s - OLDEST_S:
                 break
-            if frame.function == function and frame.node in nodes:
+            if frame.time_s >= time_s and frame.function == function and frame.node in nodes:
                 found.append(frame)
         return found[::-1]
 
