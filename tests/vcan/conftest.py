@@ -1,5 +1,6 @@
 """What the tests on a CAN interface share. All but those of the wrapper run inside tools/with-vcan."""
 
+import contextlib
 import os
 import queue
 import re
@@ -29,6 +30,22 @@ def wait_until(condition, what, timeout_s=PATIENCE_S):
         assert time.monotonic() < end, f"{what} did not happen within {timeout_s} s"
         time.sleep(0.02)
     return value
+
+
+def system(*command):
+    """Run a tool of the system's administrator, who alone has its folder in PATH."""
+    environment = os.environ | {"PATH": os.environ["PATH"] + ":/usr/sbin:/sbin"}
+    subprocess.run(command, check=True, timeout=PATIENCE_S, env=environment)
+
+
+@contextlib.contextmanager
+def medium(*discipline):
+    """vcan0 as a medium that delays frames or takes few, by a queueing discipline of tc."""
+    system("tc", "qdisc", "add", "dev", "vcan0", "root", *discipline)
+    try:
+        yield
+    finally:
+        system("tc", "qdisc", "del", "dev", "vcan0", "root")
 
 
 class Running:

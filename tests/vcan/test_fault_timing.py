@@ -4,16 +4,13 @@ Upper bounds are generous, for the machine may be busy. Lower ones are exact: a 
 station goes through all of them; each test begins with vehicles that charge. Fault 16 is in test_bus_load.py.
 """
 
-import contextlib
-import os
 import signal
 import socket
-import subprocess
 import time
 from itertools import pairwise
 
 import pytest
-from conftest import PATIENCE_S, Running, wait_until
+from conftest import PATIENCE_S, Running, medium, system, wait_until
 from scene import ALONE, FAILSAFE, FAILSAFE_W, LIMIT_W, NODES, W_PER_dA, Scene, all_sound
 from street import CTRL_STATUS, EVSE_STATUS, GATEWAY, SETPOINT, SITE_LIMIT
 
@@ -23,20 +20,6 @@ VALIDITY_S = 3.0
 SETPOINT_S = 0.5  # period
 ERROR_BUSOFF = socket.CAN_ERR_FLAG | 0x40
 OTHERS = [node for node in NODES if node != ALONE]
-
-
-def system(*command):
-    environment = os.environ | {"PATH": os.environ["PATH"] + ":/usr/sbin:/sbin"}
-    subprocess.run(command, check=True, timeout=PATIENCE_S, env=environment)
-
-
-@contextlib.contextmanager
-def medium(*discipline):
-    system("tc", "qdisc", "add", "dev", "vcan0", "root", *discipline)
-    try:
-        yield
-    finally:
-        system("tc", "qdisc", "del", "dev", "vcan0", "root")
 
 
 @pytest.fixture(scope="module")

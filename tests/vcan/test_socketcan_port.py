@@ -1,16 +1,14 @@
 """The SocketCAN port, by way of port_probe, against python-can, plain sockets and can-utils."""
 
-import contextlib
 import os
 import re
 import socket
 import struct
-import subprocess
 import time
 
 import can
 import pytest
-from conftest import PATIENCE_S, program, wait_until
+from conftest import PATIENCE_S, medium, program, system, wait_until
 
 ERROR_BUSOFF = socket.CAN_ERR_FLAG | 0x40
 ERROR_RESTARTED = socket.CAN_ERR_FLAG | 0x100
@@ -18,11 +16,6 @@ ERROR_CONTROLLER = socket.CAN_ERR_FLAG | 0x4
 RETRY_S = 0.2  # TAPER_SOCKETCAN_RETRY_MS
 SEND_QUEUE = 32  # TAPER_SOCKETCAN_SEND_QUEUE
 QUEUE = 4096  # TAPER_SOCKETCAN_QUEUE
-
-
-def system(*command):
-    environment = os.environ | {"PATH": os.environ["PATH"] + ":/usr/sbin:/sbin"}
-    subprocess.run(command, check=True, timeout=PATIENCE_S, env=environment)
 
 
 def ip(*arguments):
@@ -90,15 +83,6 @@ def both_interfaces_are_back():
         if name not in present:
             ip("link", "add", name, "type", "vcan")
         ip("link", "set", name, "mtu", "72", "up")
-
-
-@contextlib.contextmanager
-def medium(*discipline):
-    system("tc", "qdisc", "add", "dev", "vcan0", "root", *discipline)
-    try:
-        yield
-    finally:
-        system("tc", "qdisc", "del", "dev", "vcan0", "root")
 
 
 def message(identifier, data=b""):
