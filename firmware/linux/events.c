@@ -41,6 +41,15 @@ taper_event_kind_t taper_event_kind(uint8_t code) {
         KIND(LIMIT_NEGATIVE, WARNING, NULL);
         KIND(GUARD, ERROR, NULL);
         KIND(IDENTIFIED, INFO, NULL);
+        KIND(PLANNER_OFF, WARNING, NULL);
+        KIND(PLANNER_ON, INFO, NULL);
+        KIND(TICK_OVERRUN, WARNING, "ms");
+        KIND(SETPOINT_FLIP, ERROR, NULL);
+        KIND(OVER_DRAW, WARNING, "dA");
+        KIND(LOCKED_OUT, WARNING, NULL);
+        KIND(PRICE_SET, INFO, "points");
+        KIND(LIMIT_FLAPS, WARNING, NULL);
+        KIND(QUEUED, WARNING, NULL);
     }
     return (taper_event_kind_t){NULL, TAPER_LOG_WARNING, "data"};
 }

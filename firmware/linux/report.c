@@ -90,9 +90,16 @@ void taper_report_summary(const taper_reported_t *about) {
         [TAPER_COUNTER_PARAMETERS_REPAIRED] = "parameters_repaired",
         [TAPER_COUNTER_TRANSFERS] = "transfers",
         [TAPER_COUNTER_TRANSFERS_REFUSED] = "transfers_refused",
+        [TAPER_COUNTER_TICK_OVERRUNS] = "tick_overruns",
+        [TAPER_COUNTER_SETPOINT_FLIPS] = "setpoint_flips",
+        [TAPER_COUNTER_PLANNER_OFFS] = "planner_offs",
+        [TAPER_COUNTER_OVER_DRAWS] = "over_draws",
+        [TAPER_COUNTER_LOCKOUTS] = "lockouts",
+        [TAPER_COUNTER_LIMIT_FLAPS] = "limit_flaps",
+        [TAPER_COUNTER_STRANGERS] = "strangers",
     };
     _Static_assert(sizeof names / sizeof names[0] == TAPER_COUNTERS, "each counter has a name");
-    char counters[640] = "";
+    char counters[960] = "";
     size_t used = 0;
     for (unsigned i = 0; i < TAPER_COUNTERS && used < sizeof counters; i++) {
         used += (size_t)snprintf(counters + used, sizeof counters - used, " %s=%" PRIu32, names[i],

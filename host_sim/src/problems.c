@@ -6,11 +6,11 @@ void sim_problems_begin(FILE *file, const taper_station_t *station) {
 
 void sim_problems_add(FILE *file, const taper_station_t *station) {
     const taper_snapshot_t *snapshot = &station->snapshot;
-    int32_t course_W[TAPER_MAX_STEPS];
-    taper_limits_course(&station->limits, snapshot->now_ms, course_W);
+    taper_course_t course;
+    taper_limits_course(&station->limits, snapshot->now_ms, &course);
     fprintf(file, "time %lu\nlimit", (unsigned long)snapshot->now_ms);
     for (unsigned t = 0; t < station->options.config->steps; t++) {
-        fprintf(file, " %ld", (long)course_W[t]);
+        fprintf(file, " %ld", (long)course.limit_W[t]);
     }
     fprintf(file, "\n");
     for (unsigned i = 0; i < snapshot->count; i++) {

@@ -94,7 +94,7 @@ def test_the_header_has_function_codes_periods_and_timeouts_of_the_database(bus:
         ("CTRL_STATUS", "limit_source", "LIMIT"),
         ("EVSE_INFO_01", "kind", "KIND"),
         ("EVSE_INFO_01", "rotation", "ROTATION"),
-        ("PLAN_01", "reason", "REASON"),
+        ("OUTLOOK_01", "reason", "REASON"),
         ("EMCY_01", "severity", "SEVERITY"),
         ("EMCY_01", "code", "EVENT"),
         ("CTRL_DIAG", "index", "COUNTER"),

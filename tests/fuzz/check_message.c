@@ -118,10 +118,16 @@ static void check_evse_info(const taper_evse_info_t *info) {
 }
 
 static void check_plan(const taper_plan_t *plan) {
-    in_range("PLAN.reason", plan->reason, 0, 15);
     for (int k = 0; k < 3; k++) {
         in_range_or_absent("PLAN.power_W", plan->power_W[k], 0, 655340);
     }
+}
+
+static void check_outlook(const taper_outlook_t *outlook) {
+    in_range("OUTLOOK.waiting_place", outlook->waiting_place, 0, 15);
+    in_range("OUTLOOK.waiting_of", outlook->waiting_of, 0, 15);
+    in_range_or_absent("OUTLOOK.soc_at_departure_permille", outlook->soc_at_departure_permille, 0, 1000);
+    in_range_or_absent("OUTLOOK.short_Wh", outlook->short_Wh, 0, 655340);
 }
 
 void check_message(const taper_message_t *message) {
@@ -141,6 +147,7 @@ void check_message(const taper_message_t *message) {
     case TAPER_MESSAGE_EV_PARAM_D: check_param_d(&message->as.ev_param_d); break;
     case TAPER_MESSAGE_EVSE_INFO: check_evse_info(&message->as.evse_info); break;
     case TAPER_MESSAGE_PLAN: check_plan(&message->as.plan); break;
+    case TAPER_MESSAGE_OUTLOOK: check_outlook(&message->as.outlook); break;
     case TAPER_MESSAGE_CTRL_DIAG: break; /* integers of full range */
     default: check_that(false, "decoded as", (int)message->kind); break;
     }

@@ -78,15 +78,15 @@ static void check_limits(const taper_station_t *station) {
     }
     check_that(limits->metered_W >= 0, "metered_W", limits->metered_W);
     check_that(station->limit_now.other_W >= 0, "limit_now.other_W", station->limit_now.other_W);
-    check_that(station->limit_now.site_W >= 0 && station->limit_now.site_W <= site_W, "limit_now.site_W",
-               station->limit_now.site_W);
+    check_that(station->limit_now.supply.site_W >= 0 && station->limit_now.supply.site_W <= site_W,
+               "limit_now.supply.site_W", station->limit_now.supply.site_W);
 }
 
 static void check_no_demand(const taper_demand_t *demand) {
     check_that(demand->stored_Wh == 0 && demand->capacity_Wh == 0 && demand->need_Wh == 0 &&
                    demand->peak_W == 0 && demand->taper_W == 0 && demand->max_mA == 0 &&
-                   demand->min_mA == 0 && demand->W_per_A == 0 && demand->booked_W_per_A > 0 &&
-                   demand->booked_W_per_A <= 3 * 6554 && demand->departs_in_s == 0,
+                   demand->min_mA == 0 && demand->W_per_A == 0 && demand->booking.W_per_A > 0 &&
+                   demand->booking.W_per_A <= 3 * 6554 && demand->departs_in_s == 0,
                "a demand that is not active, yet not zero or not booked", 1);
 }
 
@@ -104,8 +104,8 @@ static void check_demand(const taper_connector_config_t *connector, const taper_
     check_that(demand->min_mA >= connector->min_mA && demand->min_mA <= 127000, "demand.min_mA",
                demand->min_mA);
     check_that(demand->W_per_A > 0 && demand->W_per_A <= 3 * 6554, "demand.W_per_A", demand->W_per_A);
-    check_that(demand->booked_W_per_A >= demand->W_per_A && demand->booked_W_per_A <= 3 * 6554,
-               "demand.booked_W_per_A", demand->booked_W_per_A);
+    check_that(demand->booking.W_per_A >= demand->W_per_A && demand->booking.W_per_A <= 3 * 6554,
+               "demand.booking.W_per_A", demand->booking.W_per_A);
     check_that(demand->departs_in_s >= EARLIEST_DEPARTURE_s && demand->departs_in_s <= LATEST_DEPARTURE_s,
                "demand.departs_in_s", demand->departs_in_s);
 }
@@ -129,7 +129,7 @@ static void check_groups(const taper_station_t *station, const taper_setpoints_t
     int64_t sum_mW[TAPER_MAX_GROUPS] = {0};
     for (uint8_t i = 0; i < config->connector_count; i++) {
         const int64_t draw_mW =
-            (int64_t)setpoints->current_mA[i] * station->snapshot.demand[i].booked_W_per_A;
+            (int64_t)setpoints->current_mA[i] * station->snapshot.demand[i].booking.W_per_A;
         for (uint8_t k = config->connectors[i].group; k != TAPER_NO_GROUP; k = config->groups[k].parent) {
             sum_mW[k] += draw_mW;
         }
@@ -138,7 +138,8 @@ static void check_groups(const taper_station_t *station, const taper_setpoints_t
         check_that(sum_mW[k] <= (int64_t)config->groups[k].limit_W * 1000, "power of a group [mW]",
                    sum_mW[k]);
     }
-    check_that(sum_mW[0] <= (int64_t)station->limit_now.site_W * 1000, "power of the site [mW]", sum_mW[0]);
+    check_that(sum_mW[0] <= (int64_t)station->limit_now.supply.site_W * 1000, "power of the site [mW]",
+               sum_mW[0]);
 }
 
 void check_currents(const taper_station_t *station) {

@@ -25,7 +25,7 @@
 
 static taper_planner_t planner;
 static taper_snapshot_t snapshot;
-static int32_t limit_W[TAPER_MAX_STEPS];
+static taper_course_t course = {.phase_mA = {TAPER_NO_LIMIT, TAPER_NO_LIMIT, TAPER_NO_LIMIT}};
 static const taper_station_config_t *config;
 
 static void fail(const char *line) {
@@ -53,7 +53,7 @@ static void select_station(const char *line) {
 static void read_limits(char *line) {
     char *at = line + strlen("limit");
     for (uint8_t t = 0; t < config->steps; t++) {
-        limit_W[t] = (int32_t)strtol(at, &at, 10);
+        course.limit_W[t] = (int32_t)strtol(at, &at, 10);
     }
 }
 
@@ -104,7 +104,7 @@ static void print_numbers(void) {
 static void solve(bool numbers) {
     snapshot.count = config->connector_count;
     const double began_us = now_us();
-    taper_planner_start(&planner, &snapshot, limit_W);
+    taper_planner_start(&planner, &snapshot, &course);
     while (taper_planner_run(&planner, TAPER_MAX_ITERATIONS) == TAPER_VERDICT_SOLVING) {
     }
     const double took_us = now_us() - began_us;

@@ -15,7 +15,8 @@ void tearDown(void) {}
 
 static void allocate(const taper_station_config_t *config, const taper_snapshot_t *snapshot,
                      const taper_proposal_t *proposal, int32_t site_limit_W) {
-    taper_allocate(&allocator, config, snapshot, proposal, site_limit_W, NULL, &setpoints);
+    const taper_supply_t supply = taper_supply_of_W(site_limit_W);
+    taper_allocate(&allocator, config, snapshot, proposal, &supply, NULL, &setpoints);
 }
 
 static int64_t power_mW(const taper_snapshot_t *snapshot, uint8_t first, uint8_t last) {
@@ -263,7 +264,8 @@ static void test_limits_hold_under_a_hundred_thousand_hostile_proposals(void) {
         const int32_t site_limit_W = hostile(&state);
         allocate(scene_four(), &snapshot, &proposal, site_limit_W);
         assert_limits_hold(&snapshot, site_limit_W);
-        TEST_ASSERT_TRUE(taper_guard_passes(scene_four(), &snapshot, site_limit_W, &setpoints));
+        const taper_supply_t supply = taper_supply_of_W(site_limit_W);
+        TEST_ASSERT_TRUE(taper_guard_passes(scene_four(), &snapshot, &supply, &setpoints));
         with_current += power_mW(&snapshot, 0, 3) > 0 ? 1 : 0;
     }
     TEST_ASSERT_GREATER_THAN_UINT32(
@@ -295,7 +297,8 @@ static void test_the_guard_refuses_every_kind_of_excess(void) {
     for (size_t k = 0; k < sizeof cases / sizeof cases[0]; k++) {
         memset(&setpoints, 0, sizeof setpoints);
         memcpy(setpoints.current_mA, cases[k].current_mA, sizeof cases[k].current_mA);
-        const bool passes = taper_guard_passes(scene_four(), &snapshot, cases[k].site_limit_W, &setpoints);
+        const taper_supply_t supply = taper_supply_of_W(cases[k].site_limit_W);
+        const bool passes = taper_guard_passes(scene_four(), &snapshot, &supply, &setpoints);
         TEST_ASSERT_EQUAL_MESSAGE(cases[k].passes, passes, cases[k].what);
     }
 }

@@ -3,11 +3,14 @@
 
 #include "scene.h"
 #include "taper/allocator.h"
+#include "taper/rows.h"
 #include "unity.h"
 
 static taper_allocator_t allocator;
 static taper_snapshot_t snapshot;
 static taper_setpoints_t setpoints;
+static const taper_supply_t built = {.site_W = 25000,
+                                     .phase_mA = {TAPER_NO_LIMIT, TAPER_NO_LIMIT, TAPER_NO_LIMIT}};
 static int32_t reserved_mA[TAPER_MAX_CONNECTORS];
 
 void setUp(void) {
@@ -18,9 +21,10 @@ void setUp(void) {
 void tearDown(void) {}
 
 static void allocate(int32_t wish_W, int32_t site_limit_W) {
+    const taper_supply_t supply = taper_supply_of_W(site_limit_W);
     const taper_proposal_t proposal = scene_proposal(wish_W);
-    taper_allocate(&allocator, scene_four(), &snapshot, &proposal, site_limit_W, reserved_mA, &setpoints);
-    TEST_ASSERT_TRUE(taper_guard_passes(scene_four(), &snapshot, site_limit_W, &setpoints));
+    taper_allocate(&allocator, scene_four(), &snapshot, &proposal, &supply, reserved_mA, &setpoints);
+    TEST_ASSERT_TRUE(taper_guard_passes(scene_four(), &snapshot, &supply, &setpoints));
 }
 
 static void test_what_a_silent_connector_may_draw_is_kept_free_for_it(void) {
@@ -51,7 +55,7 @@ static void test_when_the_reservation_ends_the_others_get_it(void) {
 }
 
 static void test_phases_that_are_not_known_are_booked_three_times(void) {
-    snapshot.demand[0].booked_W_per_A = 690;
+    snapshot.demand[0].booking.W_per_A = 690;
     allocate(7360, 25000);
     TEST_ASSERT_EQUAL_INT32(17300, setpoints.current_mA[0]); /* 11 937 W of the feeder's 11 960 W */
     TEST_ASSERT_EQUAL_INT32(0, setpoints.current_mA[1]);
@@ -59,19 +63,19 @@ static void test_phases_that_are_not_known_are_booked_three_times(void) {
 }
 
 static void test_nothing_booked_is_booked_as_drawn(void) {
-    snapshot.demand[0].booked_W_per_A = 0;
-    TEST_ASSERT_EQUAL_INT32(230, taper_demand_booked_W_per_A(&snapshot.demand[0]));
-    snapshot.demand[0].booked_W_per_A = 100; /* less than it draws cannot be meant */
-    TEST_ASSERT_EQUAL_INT32(230, taper_demand_booked_W_per_A(&snapshot.demand[0]));
+    snapshot.demand[0].booking.W_per_A = 0;
+    TEST_ASSERT_EQUAL_INT32(230, taper_booking_now(scene_four(), &snapshot, 0).W_per_A);
+    snapshot.demand[0].booking.W_per_A = 100; /* less than it draws cannot be meant */
+    TEST_ASSERT_EQUAL_INT32(230, taper_booking_now(scene_four(), &snapshot, 0).W_per_A);
 }
 
 static void test_the_guard_counts_phases_that_are_not_known(void) {
-    snapshot.demand[0].booked_W_per_A = 690;
+    snapshot.demand[0].booking.W_per_A = 690;
     memset(&setpoints, 0, sizeof setpoints);
     setpoints.current_mA[0] = 17300;
-    TEST_ASSERT_TRUE(taper_guard_passes(scene_four(), &snapshot, 25000, &setpoints));
+    TEST_ASSERT_TRUE(taper_guard_passes(scene_four(), &snapshot, &built, &setpoints));
     setpoints.current_mA[0] = 17400;
-    TEST_ASSERT_FALSE(taper_guard_passes(scene_four(), &snapshot, 25000, &setpoints));
+    TEST_ASSERT_FALSE(taper_guard_passes(scene_four(), &snapshot, &built, &setpoints));
 }
 
 int main(void) {

@@ -29,6 +29,7 @@ enum {
     KIND_ev_param_d = TAPER_MESSAGE_EV_PARAM_D,
     KIND_evse_info = TAPER_MESSAGE_EVSE_INFO,
     KIND_plan = TAPER_MESSAGE_PLAN,
+    KIND_outlook = TAPER_MESSAGE_OUTLOOK,
     KIND_ctrl_diag = TAPER_MESSAGE_CTRL_DIAG,
 };
 

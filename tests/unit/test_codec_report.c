@@ -143,10 +143,9 @@ static void test_an_unnamed_kind_or_rotation_is_not_encoded(void) {
 }
 
 static void test_a_plan_by_hand(void) {
-    static const uint8_t data[8] = {0, 0x60, 0x50, 0x04, 0xFF, 0xFF, 0xFE, 0xFF};
+    static const uint8_t data[8] = {0, 0, 0x50, 0x04, 0xFF, 0xFF, 0xFE, 0xFF};
     const taper_message_t message = there_and_back(0x3BC, data);
     TEST_ASSERT_EQUAL_UINT8(60, message.node);
-    TEST_ASSERT_EQUAL_UINT8(TAPER_REASON_WAITING, message.as.plan.reason);
     TEST_ASSERT_EQUAL_INT32(11040, message.as.plan.power_W[0]);
     TEST_ASSERT_EQUAL_INT32(TAPER_ABSENT, message.as.plan.power_W[1]);
     TEST_ASSERT_EQUAL_INT32(655340, message.as.plan.power_W[2]);
@@ -162,16 +161,46 @@ static void test_planned_power_is_rounded_to_the_nearest_and_kept_to_the_range(v
     TEST_ASSERT_EQUAL_INT32(655340, plan.power_W[2]);
 }
 
-static void test_a_plan_without_a_named_reason_is_refused(void) {
-    taper_frame_t frame = codec_bench_frame_of(TAPER_MESSAGE_PLAN);
-    frame.data[1] = 0xF0;
-    taper_message_t message;
+static void test_an_outlook_by_hand(void) {
+    /* estimated, no clock; waiting, 2nd of 3; 61.5 % at departure, 12.34 kWh short because of a phase */
+    static const uint8_t data[8] = {0, 0x90, 0x06, 0x32, 0x7B, 0xD2, 0x04, 0x10};
+    const taper_message_t message = there_and_back(0x440 + 9, data);
+    const taper_outlook_t *outlook = &message.as.outlook;
+    TEST_ASSERT_EQUAL_UINT8(9, message.node);
+    TEST_ASSERT_TRUE(outlook->soc_estimated && outlook->no_clock);
+    TEST_ASSERT_FALSE(outlook->by_energy || outlook->departure_passed);
+    TEST_ASSERT_EQUAL_UINT8(TAPER_REASON_WAITING, outlook->reason);
+    TEST_ASSERT_EQUAL_UINT8(2, outlook->waiting_place);
+    TEST_ASSERT_EQUAL_UINT8(3, outlook->waiting_of);
+    TEST_ASSERT_EQUAL_INT32(615, outlook->soc_at_departure_permille);
+    TEST_ASSERT_EQUAL_INT32(12340, outlook->short_Wh);
+    TEST_ASSERT_EQUAL_UINT8(TAPER_REASON_PHASE_LIMIT, outlook->because);
+}
+
+static void test_an_outlook_without_a_named_reason_is_refused(void) {
+    taper_frame_t frame = codec_bench_frame_of(TAPER_MESSAGE_OUTLOOK);
+    frame.data[2] = 0xF0;
+    taper_message_t refused;
     bool bad = false;
-    TEST_ASSERT_FALSE(taper_decode(&frame, &message, &bad));
+    TEST_ASSERT_FALSE(taper_decode(&frame, &refused, &bad));
     TEST_ASSERT_TRUE(bad);
-    message = codec_bench_message_of(TAPER_MESSAGE_PLAN);
-    message.as.plan.reason = 15;
+    taper_message_t message = codec_bench_message_of(TAPER_MESSAGE_OUTLOOK);
+    TEST_ASSERT_TRUE(encodes(&message));
+    message.as.outlook.reason = 0xFF;
     TEST_ASSERT_FALSE(encodes(&message));
+    message.as.outlook.reason = TAPER_REASON_PLANNED;
+    message.as.outlook.because = 0xFF;
+    TEST_ASSERT_FALSE(encodes(&message));
+}
+
+static void test_more_than_fifteen_that_wait_are_fifteen(void) {
+    taper_message_t message = codec_bench_message_of(TAPER_MESSAGE_OUTLOOK);
+    message.as.outlook.waiting_place = 16;
+    message.as.outlook.waiting_of = 200;
+    const taper_frame_t frame = codec_bench_encode(&message);
+    const taper_outlook_t outlook = codec_bench_decode(&frame).as.outlook;
+    TEST_ASSERT_EQUAL_UINT8(15, outlook.waiting_place);
+    TEST_ASSERT_EQUAL_UINT8(15, outlook.waiting_of);
 }
 
 static void test_a_ctrl_diag_by_hand(void) {
@@ -213,7 +242,9 @@ int main(void) {
     RUN_TEST(test_an_unnamed_kind_or_rotation_is_not_encoded);
     RUN_TEST(test_a_plan_by_hand);
     RUN_TEST(test_planned_power_is_rounded_to_the_nearest_and_kept_to_the_range);
-    RUN_TEST(test_a_plan_without_a_named_reason_is_refused);
+    RUN_TEST(test_an_outlook_by_hand);
+    RUN_TEST(test_an_outlook_without_a_named_reason_is_refused);
+    RUN_TEST(test_more_than_fifteen_that_wait_are_fifteen);
     RUN_TEST(test_a_ctrl_diag_by_hand);
     RUN_TEST(test_a_counter_without_a_name_is_passed_on_and_carried_whole);
     RUN_TEST(test_the_bus_names_the_verdicts_of_the_planner);

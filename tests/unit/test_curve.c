@@ -57,12 +57,12 @@ static void start_with_a_longer_course(void) {
 
 /** What the planner would be given for the step that holds `after_s`, without what the site itself takes [W]. */
 static int32_t course_W(double after_s) {
-    int32_t course[TAPER_MAX_STEPS];
-    taper_limits_course(&live.station.limits, live.now_ms, course);
+    taper_course_t course;
+    taper_limits_course(&live.station.limits, live.now_ms, &course);
     const double ahead_s = after_s - (sim_field_world_s(&live.field) - LIVE_START_S);
     const unsigned step = (unsigned)(ahead_s / live.config.step_s);
     TEST_ASSERT_LESS_THAN_UINT32(live.config.steps, step);
-    return course[step] + taper_limits_other_W(&live.station.limits, live.now_ms);
+    return course.limit_W[step] + taper_limits_other_W(&live.station.limits, live.now_ms);
 }
 
 static unsigned curves_noted(void) {

@@ -184,25 +184,25 @@ static void tick_on_one_phase(uint8_t rotation) {
 static void test_row_46_a_connector_of_unknown_rotation_counts_on_all_phases(void) {
     tick_on_one_phase(TAPER_ROTATION_231);
     const taper_demand_t *demand = &bench.station.snapshot.demand[0];
-    TEST_ASSERT_EQUAL_INT32(230, demand->booked_W_per_A);
+    TEST_ASSERT_EQUAL_INT32(230, demand->booking.W_per_A);
     TEST_ASSERT_EQUAL_UINT(0, bench_events(TAPER_EVENT_ROTATION));
     const int32_t sound_mA = bench_setpoint_for(2).current_mA;
     for (int k = 0; k < 3; k++) {
         tick_on_one_phase(TAPER_ROTATION_UNKNOWN);
     }
-    TEST_ASSERT_EQUAL_INT32(690, demand->booked_W_per_A);
+    TEST_ASSERT_EQUAL_INT32(690, demand->booking.W_per_A);
     TEST_ASSERT_EQUAL_INT32(230, demand->W_per_A); /* planned as it draws */
     TEST_ASSERT_EQUAL_UINT(1, bench_events(TAPER_EVENT_ROTATION));
     TEST_ASSERT_GREATER_THAN_INT32(0, bench_setpoint_for(1).current_mA);
     TEST_ASSERT_EQUAL_INT32(sound_mA, bench_setpoint_for(2).current_mA);
     tick_on_one_phase(TAPER_ROTATION_123);
-    TEST_ASSERT_EQUAL_INT32(230, demand->booked_W_per_A);
+    TEST_ASSERT_EQUAL_INT32(230, demand->booking.W_per_A);
 }
 
 static void test_row_46_a_connector_that_never_told_its_rotation_counts_as_described(void) {
     session[1] = 7;
     tick();
-    TEST_ASSERT_EQUAL_INT32(690, bench.station.snapshot.demand[0].booked_W_per_A);
+    TEST_ASSERT_EQUAL_INT32(690, bench.station.snapshot.demand[0].booking.W_per_A);
     TEST_ASSERT_EQUAL_UINT(0, bench_events(TAPER_EVENT_ROTATION));
 }
 

@@ -14,19 +14,19 @@
 
 static taper_horizon_t horizon;
 static taper_snapshot_t snapshot;
-static int32_t course_W[TAPER_MAX_STEPS];
+static taper_course_t course = {.phase_mA = {TAPER_NO_LIMIT, TAPER_NO_LIMIT, TAPER_NO_LIMIT}};
 
 void setUp(void) {
     memset(&horizon, 0x5A, sizeof horizon); /* whatever was there must not matter */
     snapshot = scene_snapshot(0, 1);
     for (int t = 0; t < STEPS; t++) {
-        course_W[t] = 20000;
+        course.limit_W[t] = 20000;
     }
 }
 void tearDown(void) {}
 
 static void build(void) {
-    taper_horizon_build(&horizon, scene_four(), &snapshot, course_W);
+    taper_horizon_build(&horizon, scene_four(), &snapshot, &course);
 }
 
 static void assert_near(double expected, taper_real_t actual) {
@@ -93,8 +93,8 @@ static void test_idle_connectors_stand_still_by_bounds_and_cost_nothing(void) {
 }
 
 static void test_sums_follow_the_course_for_the_site_and_the_table_below(void) {
-    course_W[3] = 10000;
-    course_W[4] = 90000; /* more than the site was built for */
+    course.limit_W[3] = 10000;
+    course.limit_W[4] = 90000; /* more than the site was built for */
     build();
     const double site = sqrt(5.0 / 4) / 7360;
     const double feeder = sqrt(5.0 / 2) / 7360;

@@ -18,12 +18,12 @@ static uint32_t now_ms;
 
 static void wait_ms(uint32_t ms) {
     now_ms += ms;
-    taper_ledger_update(&ledger, scene_four(), now_ms);
+    taper_ledger_update(&ledger, now_ms);
 }
 
 void setUp(void) {
     now_ms = START_ms;
-    taper_ledger_init(&ledger, scene_four(), VALIDITY_ms, now_ms);
+    taper_ledger_init(&ledger, scene_four(), VALIDITY_ms, 1, now_ms);
     wait_ms(VALIDITY_ms); /* nothing of an earlier life is left */
     snapshot = scene_snapshot(now_ms, 4);
     memset(&target, 0, sizeof target);
@@ -34,7 +34,7 @@ void setUp(void) {
 void tearDown(void) {}
 
 static void send(uint8_t connector, uint8_t counter, int32_t current_mA) {
-    taper_ledger_sent(&ledger, connector, counter, current_mA, now_ms);
+    taper_ledger_sent(&ledger, connector, counter, current_mA, 0, now_ms);
 }
 
 static void hear_echo(uint8_t connector, uint8_t counter) {
@@ -47,14 +47,20 @@ static void hear_fallback(uint8_t connector) {
     taper_ledger_hear(&ledger, connector, &status, now_ms);
 }
 
+static bool hand_over_passes(int32_t site_limit_W) {
+    const taper_supply_t supply = taper_supply_of_W(site_limit_W);
+    return taper_guard_hand_over_passes(&ledger, scene_four(), &snapshot, &supply, &granted);
+}
+
 static void grant(int32_t site_limit_W) {
-    taper_ledger_grant(&ledger, scene_four(), &snapshot, rank, site_limit_W, &target, &granted);
-    TEST_ASSERT_TRUE(taper_guard_hand_over_passes(&ledger, scene_four(), &snapshot, site_limit_W, &granted));
+    const taper_supply_t supply = taper_supply_of_W(site_limit_W);
+    taper_ledger_grant(&ledger, scene_four(), &snapshot, rank, &supply, &target, &granted);
+    TEST_ASSERT_TRUE(taper_guard_hand_over_passes(&ledger, scene_four(), &snapshot, &supply, &granted));
 }
 
 static void test_at_the_start_a_connector_may_draw_its_maximum_until_old_setpoints_have_expired(void) {
     now_ms = START_ms;
-    taper_ledger_init(&ledger, scene_four(), VALIDITY_ms, now_ms);
+    taper_ledger_init(&ledger, scene_four(), VALIDITY_ms, 1, now_ms);
     wait_ms(VALIDITY_ms - 1);
     TEST_ASSERT_EQUAL_INT32(32000, taper_ledger_may_mA(&ledger, 0));
     TEST_ASSERT_EQUAL_INT32(0, taper_ledger_told_mA(&ledger, 0));
@@ -64,7 +70,7 @@ static void test_at_the_start_a_connector_may_draw_its_maximum_until_old_setpoin
 
 static void test_at_the_start_one_echo_may_be_of_an_earlier_life_and_a_second_one_is_not(void) {
     now_ms = START_ms;
-    taper_ledger_init(&ledger, scene_four(), VALIDITY_ms, now_ms);
+    taper_ledger_init(&ledger, scene_four(), VALIDITY_ms, 1, now_ms);
     send(0, 0, 0);
     send(0, 1, 0);
     hear_echo(0, 0);
@@ -77,7 +83,7 @@ static void test_at_the_start_one_echo_may_be_of_an_earlier_life_and_a_second_on
 static void test_at_the_start_a_connector_that_fell_back_or_is_empty_draws_nothing(void) {
     const taper_evse_status_t empty = {.pilot = TAPER_PILOT_A};
     now_ms = START_ms;
-    taper_ledger_init(&ledger, scene_four(), VALIDITY_ms, now_ms);
+    taper_ledger_init(&ledger, scene_four(), VALIDITY_ms, 1, now_ms);
     hear_fallback(0);
     taper_ledger_hear(&ledger, 1, &empty, now_ms);
     TEST_ASSERT_EQUAL_INT32(0, taper_ledger_may_mA(&ledger, 0));
@@ -225,7 +231,7 @@ static void test_what_a_silent_connector_may_draw_counts_by_its_description(void
 
 static void test_phases_that_are_not_known_are_booked_when_granting(void) {
     target.current_mA[2] = 16000;
-    snapshot.demand[2].booked_W_per_A = 690;
+    snapshot.demand[2].booking.W_per_A = 690;
     grant(9200);
     TEST_ASSERT_EQUAL_INT32(13300, granted.current_mA[2]);
 }
@@ -234,17 +240,17 @@ static void test_the_guard_of_the_hand_over_refuses_what_is_not_paid_for(void) {
     send(0, 0, 20000);
     memset(&granted, 0, sizeof granted);
     granted.current_mA[1] = 20000;
-    TEST_ASSERT_TRUE(taper_guard_hand_over_passes(&ledger, scene_four(), &snapshot, 9200, &granted));
+    TEST_ASSERT_TRUE(hand_over_passes(9200));
     granted.current_mA[1] = 20100;
-    TEST_ASSERT_FALSE(taper_guard_hand_over_passes(&ledger, scene_four(), &snapshot, 9200, &granted));
+    TEST_ASSERT_FALSE(hand_over_passes(9200));
     granted.current_mA[1] = 0;
     granted.current_mA[0] = 20000; /* above a limit that fell, but no more than it may draw already */
-    TEST_ASSERT_TRUE(taper_guard_hand_over_passes(&ledger, scene_four(), &snapshot, 1000, &granted));
+    TEST_ASSERT_TRUE(hand_over_passes(1000));
     granted.current_mA[0] = 20100;
-    TEST_ASSERT_FALSE(taper_guard_hand_over_passes(&ledger, scene_four(), &snapshot, 1000, &granted));
+    TEST_ASSERT_FALSE(hand_over_passes(1000));
     granted.current_mA[0] = 0;
     granted.current_mA[2] = granted.current_mA[3] = 26100; /* their feeder, within the site's limit */
-    TEST_ASSERT_FALSE(taper_guard_hand_over_passes(&ledger, scene_four(), &snapshot, 25000, &granted));
+    TEST_ASSERT_FALSE(hand_over_passes(25000));
 }
 
 int main(void) {

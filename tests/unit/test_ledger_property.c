@@ -59,6 +59,8 @@ static taper_ledger_t ledger;
 static taper_allocator_t allocator;
 static taper_snapshot_t snapshot;
 static taper_setpoints_t target, granted;
+static const taper_supply_t supply = {.site_W = LIMIT_W,
+                                      .phase_mA = {TAPER_NO_LIMIT, TAPER_NO_LIMIT, TAPER_NO_LIMIT}};
 static taper_proposal_t proposal;
 static uint32_t now_ms, tick_ms, state;
 static uint64_t used_W;
@@ -79,7 +81,7 @@ static uint32_t arrival(uint32_t *last_ms) {
 
 /** The station begins anew. What was on its way, to it or from it, has arrived by then or never will. */
 static void start_station(void) {
-    taper_ledger_init(&ledger, scene_four(), VALIDITY_ms, now_ms);
+    taper_ledger_init(&ledger, scene_four(), VALIDITY_ms, 1, now_ms);
     taper_allocator_init(&allocator);
     memset(&target, 0, sizeof target);
     memset(&granted, 0, sizeof granted);
@@ -190,7 +192,7 @@ static void think(void) {
         proposal.wish_W[i] = proposal.ceiling_W[i] = (int32_t)below(8000);
         proposal.rank[i] = (uint8_t)((i + below(2)) % CONNECTORS);
     }
-    taper_allocate(&allocator, scene_four(), &snapshot, &proposal, LIMIT_W, NULL, &target);
+    taper_allocate(&allocator, scene_four(), &snapshot, &proposal, &supply, NULL, &target);
     tick_ms = now_ms;
 }
 
@@ -202,7 +204,7 @@ static void send(uint8_t i) {
         c->setpoint_head - c->setpoint_tail == IN_FLIGHT) {
         return;
     }
-    taper_ledger_sent(&ledger, i, c->counter, current_mA, now_ms);
+    taper_ledger_sent(&ledger, i, c->counter, current_mA, 0, now_ms);
     const uint32_t arrives_ms = arrival(&c->last_setpoint_ms);
     if (below(10) != 0) { /* lost */
         c->setpoint[c->setpoint_head % IN_FLIGHT] = (flying_setpoint_t){.arrives_ms = arrives_ms,
@@ -220,13 +222,13 @@ static void run_station(void) {
     for (uint8_t i = 0; i < CONNECTORS; i++) {
         hear_reports(i);
     }
-    taper_ledger_update(&ledger, scene_four(), now_ms);
+    taper_ledger_update(&ledger, now_ms);
     if (taper_elapsed_ms(now_ms, tick_ms) >= 1000) {
         think();
     }
-    taper_ledger_grant(&ledger, scene_four(), &snapshot, proposal.rank, LIMIT_W, &target, &granted);
-    TEST_ASSERT_TRUE(taper_guard_passes(scene_four(), &snapshot, LIMIT_W, &granted));
-    TEST_ASSERT_TRUE(taper_guard_hand_over_passes(&ledger, scene_four(), &snapshot, LIMIT_W, &granted));
+    taper_ledger_grant(&ledger, scene_four(), &snapshot, proposal.rank, &supply, &target, &granted);
+    TEST_ASSERT_TRUE(taper_guard_passes(scene_four(), &snapshot, &supply, &granted));
+    TEST_ASSERT_TRUE(taper_guard_hand_over_passes(&ledger, scene_four(), &snapshot, &supply, &granted));
     for (uint8_t i = 0; i < CONNECTORS; i++) {
         send(i);
     }

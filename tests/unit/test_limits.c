@@ -26,7 +26,7 @@ static void point(uint32_t time_ms, int32_t limit_W) {
 
 static void assert_now(int32_t site_W, taper_limit_source_t source, uint32_t now_ms) {
     const taper_limit_now_t now = taper_limits_now(&limits, now_ms);
-    TEST_ASSERT_EQUAL_INT32(site_W, now.site_W);
+    TEST_ASSERT_EQUAL_INT32(site_W, now.supply.site_W);
     TEST_ASSERT_EQUAL(source, now.source);
 }
 
@@ -110,39 +110,39 @@ static void test_a_curve_out_of_order_is_refused_and_the_old_one_stays(void) {
 }
 
 static void test_the_course_has_the_limit_of_now_first_and_then_means(void) {
-    int32_t course_W[TAPER_MAX_STEPS];
+    taper_course_t course;
     point(0, 20000);
     point(900000 + 450000, 10000); /* in the middle of the second step */
     TEST_ASSERT_EQUAL(TAPER_OK, taper_limits_set_curve(&limits, &curve));
     gateway_says(20000, 0);
-    taper_limits_course(&limits, 0, course_W);
-    TEST_ASSERT_EQUAL_INT32(20000, course_W[0]);
-    TEST_ASSERT_EQUAL_INT32(15000, course_W[1]);
-    TEST_ASSERT_EQUAL_INT32(10000, course_W[2]);
-    TEST_ASSERT_EQUAL_INT32(10000, course_W[23]);
+    taper_limits_course(&limits, 0, &course);
+    TEST_ASSERT_EQUAL_INT32(20000, course.limit_W[0]);
+    TEST_ASSERT_EQUAL_INT32(15000, course.limit_W[1]);
+    TEST_ASSERT_EQUAL_INT32(10000, course.limit_W[2]);
+    TEST_ASSERT_EQUAL_INT32(10000, course.limit_W[23]);
 }
 
 static void test_the_course_knows_of_rises(void) {
-    int32_t course_W[TAPER_MAX_STEPS];
+    taper_course_t course;
     point(0, 5050);
     point(900000, 20000);
     TEST_ASSERT_EQUAL(TAPER_OK, taper_limits_set_curve(&limits, &curve));
     gateway_says(5000, 0); /* the curve's 5050 W in the wire's steps of 100 W */
-    taper_limits_course(&limits, 0, course_W);
-    TEST_ASSERT_EQUAL_INT32(5000, course_W[0]);
-    TEST_ASSERT_EQUAL_INT32(20000, course_W[1]);
+    taper_limits_course(&limits, 0, &course);
+    TEST_ASSERT_EQUAL_INT32(5000, course.limit_W[0]);
+    TEST_ASSERT_EQUAL_INT32(20000, course.limit_W[1]);
 }
 
 static void test_a_limit_that_the_curve_does_not_explain_is_taken_to_last(void) {
-    int32_t course_W[TAPER_MAX_STEPS];
+    taper_course_t course;
     point(0, 20000);
     point(1800000, 2000);
     TEST_ASSERT_EQUAL(TAPER_OK, taper_limits_set_curve(&limits, &curve));
     gateway_says(5000, 0);
-    taper_limits_course(&limits, 0, course_W);
-    TEST_ASSERT_EQUAL_INT32(5000, course_W[0]);
-    TEST_ASSERT_EQUAL_INT32(5000, course_W[1]);
-    TEST_ASSERT_EQUAL_INT32(2000, course_W[2]);
+    taper_limits_course(&limits, 0, &course);
+    TEST_ASSERT_EQUAL_INT32(5000, course.limit_W[0]);
+    TEST_ASSERT_EQUAL_INT32(5000, course.limit_W[1]);
+    TEST_ASSERT_EQUAL_INT32(2000, course.limit_W[2]);
 }
 
 static void test_an_old_limit_does_not_come_back_when_the_clock_has_gone_round(void) {
@@ -167,15 +167,15 @@ static void test_the_last_point_of_a_curve_holds_for_months(void) {
 }
 
 static void test_several_points_within_one_step_are_averaged(void) {
-    int32_t course_W[TAPER_MAX_STEPS];
+    taper_course_t course;
     point(900000, 9000);
     point(1200000, 6000);
     point(1500000, 3000);
     TEST_ASSERT_EQUAL(TAPER_OK, taper_limits_set_curve(&limits, &curve));
     gateway_says(25000, 0);
-    taper_limits_course(&limits, 0, course_W);
-    TEST_ASSERT_EQUAL_INT32(6000, course_W[1]);
-    TEST_ASSERT_EQUAL_INT32(3000, course_W[2]);
+    taper_limits_course(&limits, 0, &course);
+    TEST_ASSERT_EQUAL_INT32(6000, course.limit_W[1]);
+    TEST_ASSERT_EQUAL_INT32(3000, course.limit_W[2]);
 }
 
 int main(void) {

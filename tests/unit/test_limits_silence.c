@@ -136,7 +136,7 @@ static void test_a_phase_without_a_value_counts_as_a_third_and_feeding_in_gives_
 
 static void test_other_load_above_the_limit_leaves_nothing(void) {
     say(true, 5000);
-    TEST_ASSERT_EQUAL_INT32(0, taper_limits_now(&limits, now_ms).site_W);
+    TEST_ASSERT_EQUAL_INT32(0, taper_limits_now(&limits, now_ms).supply.site_W);
     TEST_ASSERT_EQUAL_INT32(6000, taper_limits_now(&limits, now_ms).other_W);
 }
 

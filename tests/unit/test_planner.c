@@ -11,7 +11,7 @@
 
 static taper_planner_t planner;
 static taper_snapshot_t snapshot;
-static int32_t course_W[TAPER_MAX_STEPS];
+static taper_course_t course = {.phase_mA = {TAPER_NO_LIMIT, TAPER_NO_LIMIT, TAPER_NO_LIMIT}};
 static OSQPFloat poisoned[TAPER_MAX_VARIABLES];
 
 static unsigned index_of(const char *name) {
@@ -45,7 +45,7 @@ static void set_scene(void) {
         demand->departs_in_s = 3600 + 1800 * i;
     }
     for (int t = 0; t < 24; t++) {
-        course_W[t] = t < 8 ? 44000 : 22000;
+        course.limit_W[t] = t < 8 ? 44000 : 22000;
     }
 }
 
@@ -64,7 +64,7 @@ static taper_verdict_t run_to_the_end(uint16_t slice) {
 }
 
 static taper_verdict_t solve(uint16_t slice) {
-    taper_planner_start(&planner, &snapshot, course_W);
+    taper_planner_start(&planner, &snapshot, &course);
     return run_to_the_end(slice);
 }
 
@@ -101,7 +101,7 @@ static void test_the_answer_does_not_depend_on_the_slices(void) {
 }
 
 static void test_a_slice_does_no_more_than_it_may(void) {
-    taper_planner_start(&planner, &snapshot, course_W);
+    taper_planner_start(&planner, &snapshot, &course);
     TEST_ASSERT_EQUAL(TAPER_VERDICT_SOLVING, taper_planner_run(&planner, 20));
     TEST_ASSERT_EQUAL_UINT16(20, taper_planner_iterations(&planner));
     TEST_ASSERT_EQUAL(TAPER_VERDICT_SOLVING, taper_planner_run(&planner, 29)); /* whole tens only */
@@ -118,7 +118,7 @@ static void test_a_usable_plan_keeps_every_limit_exactly(void) {
             TEST_ASSERT_TRUE(power_W >= 0 && power_W <= 11000.5);
             site_W += power_W;
         }
-        TEST_ASSERT_TRUE(site_W <= course_W[t] + 0.5);
+        TEST_ASSERT_TRUE(site_W <= course.limit_W[t] + 0.5);
     }
 }
 
@@ -152,7 +152,7 @@ static void test_a_vehicle_that_left_is_not_planned_for(void) {
 }
 
 static void test_a_contradiction_is_refused_and_the_next_problem_is_solved(void) {
-    course_W[0] = -1; /* an upper bound below the lower one */
+    course.limit_W[0] = -1; /* an upper bound below the lower one */
     TEST_ASSERT_EQUAL(TAPER_VERDICT_REFUSED, solve(50));
     TEST_ASSERT_FALSE(taper_planner_is_usable(planner.verdict));
     set_scene();
@@ -160,7 +160,7 @@ static void test_a_contradiction_is_refused_and_the_next_problem_is_solved(void)
 }
 
 static void test_values_that_are_not_finite_are_seen_and_forgotten(void) {
-    taper_planner_start(&planner, &snapshot, course_W);
+    taper_planner_start(&planner, &snapshot, &course);
     poison_linear_cost(planner.solver);
     TEST_ASSERT_EQUAL(TAPER_VERDICT_NOT_FINITE, run_to_the_end(50));
     TEST_ASSERT_EQUAL(TAPER_VERDICT_SOLVED, solve(50));

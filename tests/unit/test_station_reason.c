@@ -126,12 +126,12 @@ static void test_plan_tells_the_reason_on_the_bus_and_every_connector_has_its_tu
         tick(2, 8500);
     }
     while (taper_membus_world_receive(&bench.bus, &frame)) {
-        if (frame.id >> 6 == TAPER_MESSAGE_PLAN && taper_decode(&frame, &message, &bad_field)) {
+        if (frame.id >> 6 == TAPER_MESSAGE_OUTLOOK && taper_decode(&frame, &message, &bad_field)) {
             told[message.node] = true;
             TEST_ASSERT_EQUAL(message.node == 1   ? TAPER_REASON_VEHICLE_LIMIT
                               : message.node == 2 ? TAPER_REASON_WAITING
                                                   : TAPER_REASON_NO_VEHICLE,
-                              message.as.plan.reason);
+                              message.as.outlook.reason);
         }
     }
     for (uint8_t node = 1; node <= 8; node++) {

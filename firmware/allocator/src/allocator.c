@@ -19,11 +19,11 @@ void taper_allocator_init(taper_allocator_t *allocator) {
 }
 
 /** Rooms less what connectors that cannot be told anything may still draw. */
-static void open_rooms(round_t *round, int32_t site_limit_W, const int32_t *reserved_mA) {
-    taper_rooms_open(&round->rooms, round->config, site_limit_W);
+static void open_rooms(round_t *round, const taper_supply_t *supply, const int32_t *reserved_mA) {
+    taper_rooms_open(&round->rooms, round->config, supply);
     for (uint8_t i = 0; reserved_mA != NULL && i < round->config->connector_count; i++) {
-        taper_rooms_take(&round->rooms, round->config, i,
-                         (int64_t)reserved_mA[i] * taper_rooms_W_per_A(round->config, round->snapshot, i));
+        const taper_booking_t booking = taper_booking_now(round->config, round->snapshot, i);
+        taper_rooms_take(&round->rooms, round->config, i, &booking, reserved_mA[i]);
     }
 }
 
@@ -44,25 +44,24 @@ static void raise(round_t *round, uint8_t i, int32_t target_mA) {
     if (most_mA <= present_mA) {
         return;
     }
-    const int32_t booked_W_per_A = taper_demand_booked_W_per_A(demand);
-    const int64_t room_mW = taper_rooms_least(&round->rooms, round->config, i);
-    const int32_t fits_mA = room_mW <= 0 ? 0 : taper_saturate_i32(room_mW / booked_W_per_A);
+    const taper_booking_t booking = taper_booking_now(round->config, round->snapshot, i);
+    const int32_t fits_mA = taper_max_i32(taper_rooms_left_mA(&round->rooms, round->config, i, &booking), 0);
     const int32_t raised_mA = whole_steps(present_mA + taper_min_i32(most_mA - present_mA, fits_mA));
     if (raised_mA <= present_mA || raised_mA < demand->min_mA) {
         return;
     }
-    taper_rooms_take(&round->rooms, round->config, i, (int64_t)(raised_mA - present_mA) * booked_W_per_A);
+    taper_rooms_take(&round->rooms, round->config, i, &booking, raised_mA - present_mA);
     round->current_mA[i] = raised_mA;
 }
 
 /** A switch that belongs to another session has no history. */
-static const taper_switch_t *switch_of(const round_t *round, uint8_t i) {
-    static const taper_switch_t fresh = {0};
-    const taper_switch_t *state = &round->allocator->state[i];
+static const taper_turn_t *switch_of(const round_t *round, uint8_t i) {
+    static const taper_turn_t fresh = {0};
+    const taper_turn_t *state = &round->allocator->turn[i];
     return state->session == round->snapshot->demand[i].session ? state : &fresh;
 }
 
-static bool held(const taper_switch_t *state, bool on, uint32_t now_ms, uint32_t least_ms) {
+static bool held(const taper_turn_t *state, bool on, uint32_t now_ms, uint32_t least_ms) {
     return state->switched && state->on == on && taper_elapsed_ms(now_ms, state->since_ms) < least_ms;
 }
 
@@ -107,12 +106,12 @@ static bool may_have_current(const round_t *round, uint8_t i) {
     return round->snapshot->demand[i].min_mA == 0 || !kept_off;
 }
 
-static void note_switch(taper_switch_t *state, const taper_demand_t *demand, bool on, uint32_t now_ms) {
+static void note_switch(taper_turn_t *state, const taper_demand_t *demand, bool on, uint32_t now_ms) {
     if (!demand->active || state->session != demand->session) {
-        *state = (taper_switch_t){.session = demand->active ? demand->session : 0};
+        *state = (taper_turn_t){.session = demand->active ? demand->session : 0};
     }
     if (state->on != on) {
-        *state = (taper_switch_t){.on = on, .switched = true, .session = state->session, .since_ms = now_ms};
+        *state = (taper_turn_t){.on = on, .switched = true, .session = state->session, .since_ms = now_ms};
     }
 }
 
@@ -127,8 +126,8 @@ static void raise_all(round_t *round, int32_t (*target)(const round_t *, uint8_t
 }
 
 void taper_allocate(taper_allocator_t *allocator, const taper_station_config_t *config,
-                    const taper_snapshot_t *snapshot, const taper_proposal_t *proposal, int32_t site_limit_W,
-                    const int32_t *reserved_mA, taper_setpoints_t *setpoints) {
+                    const taper_snapshot_t *snapshot, const taper_proposal_t *proposal,
+                    const taper_supply_t *supply, const int32_t *reserved_mA, taper_setpoints_t *setpoints) {
     round_t round = {
         .config = config,
         .snapshot = snapshot,
@@ -137,12 +136,12 @@ void taper_allocate(taper_allocator_t *allocator, const taper_station_config_t *
         .current_mA = setpoints->current_mA,
     };
     memset(setpoints, 0, sizeof *setpoints);
-    open_rooms(&round, site_limit_W, reserved_mA);
+    open_rooms(&round, supply, reserved_mA);
     raise_all(&round, wished_mA);
     raise_all(&round, ceiling_mA);
     raise_all(&round, ceiling_rounded_up_mA);
     for (uint8_t i = 0; i < snapshot->count; i++) {
-        note_switch(&allocator->state[i], &snapshot->demand[i], setpoints->current_mA[i] > 0,
+        note_switch(&allocator->turn[i], &snapshot->demand[i], setpoints->current_mA[i] > 0,
                     snapshot->now_ms);
     }
 }

@@ -13,7 +13,7 @@ static bool connector_passes(const taper_connector_config_t *connector, const ta
 }
 
 bool taper_guard_passes(const taper_station_config_t *config, const taper_snapshot_t *snapshot,
-                        int32_t site_limit_W, const taper_setpoints_t *setpoints) {
+                        const taper_supply_t *supply, const taper_setpoints_t *setpoints) {
     int64_t sum_mW[TAPER_MAX_GROUPS] = {0};
     for (uint8_t i = 0; i < config->connector_count; i++) {
         const int32_t current_mA = setpoints->current_mA[i];
@@ -22,12 +22,14 @@ bool taper_guard_passes(const taper_station_config_t *config, const taper_snapsh
         }
         if (current_mA > 0) {
             sum_mW[config->connectors[i].group] +=
-                (int64_t)current_mA * taper_demand_booked_W_per_A(&snapshot->demand[i]);
+                (int64_t)current_mA *
+                taper_max_i32(snapshot->demand[i].booking.W_per_A, snapshot->demand[i].W_per_A);
         }
     }
     for (uint8_t k = config->group_count; k-- > 0;) { /* children stand behind their parents */
         const int64_t limit_mW = (int64_t)config->groups[k].limit_W * 1000;
-        if (sum_mW[k] > limit_mW || (k == 0 && sum_mW[k] > (int64_t)taper_max_i32(site_limit_W, 0) * 1000)) {
+        if (sum_mW[k] > limit_mW ||
+            (k == 0 && sum_mW[k] > (int64_t)taper_max_i32(supply->site_W, 0) * 1000)) {
             return false;
         }
         if (k > 0) {
@@ -44,8 +46,8 @@ static void sum_groups(const taper_station_config_t *config, const taper_snapsho
         const taper_connector_config_t *connector = &config->connectors[i];
         const int32_t nominal_W_per_A = (connector->voltage_mV + 999) / 1000 * connector->phases;
         const taper_demand_t *demand = &snapshot->demand[i];
-        const int32_t W_per_A = demand->active ? taper_demand_booked_W_per_A(demand)
-                                               : taper_max_i32(demand->booked_W_per_A, nominal_W_per_A);
+        const int32_t W_per_A = demand->active ? taper_max_i32(demand->booking.W_per_A, demand->W_per_A)
+                                               : taper_max_i32(demand->booking.W_per_A, nominal_W_per_A);
         sum_mW[connector->group] += (int64_t)current_mA[i] * W_per_A;
     }
     for (uint8_t k = config->group_count; k-- > 1;) {
@@ -54,7 +56,7 @@ static void sum_groups(const taper_station_config_t *config, const taper_snapsho
 }
 
 bool taper_guard_hand_over_passes(const taper_ledger_t *ledger, const taper_station_config_t *config,
-                                  const taper_snapshot_t *snapshot, int32_t site_limit_W,
+                                  const taper_snapshot_t *snapshot, const taper_supply_t *supply,
                                   const taper_setpoints_t *granted) {
     int32_t before_mA[TAPER_MAX_CONNECTORS];
     int32_t after_mA[TAPER_MAX_CONNECTORS];
@@ -68,7 +70,7 @@ bool taper_guard_hand_over_passes(const taper_ledger_t *ledger, const taper_stat
     sum_groups(config, snapshot, after_mA, after_mW);
     for (uint8_t k = 0; k < config->group_count; k++) {
         const int32_t limit_W =
-            k == 0 ? taper_min_i32(config->groups[0].limit_W, site_limit_W) : config->groups[k].limit_W;
+            k == 0 ? taper_min_i32(config->groups[0].limit_W, supply->site_W) : config->groups[k].limit_W;
         if (after_mW[k] > (int64_t)taper_max_i32(limit_W, 0) * 1000 && after_mW[k] > before_mW[k]) {
             return false;
         }

@@ -6,9 +6,11 @@
 #define CROSSING_ms (2u * TAPER_LEDGER_LATE_ms)
 
 void taper_ledger_init(taper_ledger_t *ledger, const taper_station_config_t *config, uint32_t validity_ms,
-                       uint32_t now_ms) {
+                       uint32_t time_scale, uint32_t now_ms) {
     memset(ledger, 0, sizeof *ledger);
+    ledger->config = config;
     ledger->validity_ms = validity_ms;
+    ledger->time_scale = time_scale;
     for (uint8_t i = 0; i < config->connector_count; i++) {
         ledger->entry[i].unknown_mA = config->connectors[i].max_mA;
         ledger->entry[i].unknown_until_ms = now_ms + validity_ms;
@@ -28,9 +30,10 @@ bool taper_ledger_can_send(const taper_ledger_t *ledger, uint8_t connector, uint
 }
 
 void taper_ledger_sent(taper_ledger_t *ledger, uint8_t connector, uint8_t counter, int32_t current_mA,
-                       uint32_t now_ms) {
+                       int32_t fallback_mA, uint32_t now_ms) {
     taper_ledger_entry_t *entry = &ledger->entry[connector];
     entry->sent_dA[counter] = (uint16_t)(current_mA / TAPER_CURRENT_STEP_mA);
+    entry->fallback_dA[counter] = (uint16_t)(fallback_mA / TAPER_CURRENT_STEP_mA);
     entry->sent_ms[counter] = now_ms;
     entry->open = (uint16_t)(entry->open | 1u << counter);
 }
@@ -89,8 +92,8 @@ void taper_ledger_hear(taper_ledger_t *ledger, uint8_t connector, const taper_ev
     }
 }
 
-void taper_ledger_update(taper_ledger_t *ledger, const taper_station_config_t *config, uint32_t now_ms) {
-    for (uint8_t i = 0; i < config->connector_count; i++) {
+void taper_ledger_update(taper_ledger_t *ledger, uint32_t now_ms) {
+    for (uint8_t i = 0; i < ledger->config->connector_count; i++) {
         taper_ledger_entry_t *entry = &ledger->entry[i];
         close_older(entry, now_ms, ledger->validity_ms + TAPER_LEDGER_LATE_ms);
         if (entry->unknown_mA != 0 && taper_time_reached(now_ms, entry->unknown_until_ms)) {

@@ -1,36 +1,39 @@
 #include "rooms.h"
 
-void taper_rooms_open(taper_rooms_t *rooms, const taper_station_config_t *config, int32_t site_limit_W) {
+void taper_rooms_open(taper_rooms_t *rooms, const taper_station_config_t *config,
+                      const taper_supply_t *supply) {
     for (uint8_t k = 0; k < config->group_count; k++) {
-        int32_t limit_W = config->groups[k].limit_W;
-        if (k == 0) {
-            limit_W = taper_min_i32(limit_W, site_limit_W);
+        for (int kind = 0; kind < TAPER_ROW_SUMS; kind++) {
+            const int32_t limit = taper_row_limit_now(config, supply, k, (taper_row_kind_t)kind);
+            rooms->room[k][kind] = limit == TAPER_NO_LIMIT ? INT64_MAX : (int64_t)limit * 1000;
         }
-        rooms->room_mW[k] = (int64_t)taper_max_i32(limit_W, 0) * 1000;
     }
 }
 
-int64_t taper_rooms_least(const taper_rooms_t *rooms, const taper_station_config_t *config, uint8_t i) {
-    int64_t least = INT64_MAX;
+int32_t taper_rooms_left_mA(const taper_rooms_t *rooms, const taper_station_config_t *config, uint8_t i,
+                            const taper_booking_t *booking) {
+    int64_t least_mA = INT32_MAX;
     for (uint8_t k = config->connectors[i].group; k != TAPER_NO_GROUP; k = config->groups[k].parent) {
-        least = rooms->room_mW[k] < least ? rooms->room_mW[k] : least;
+        for (int kind = 0; kind < TAPER_ROW_SUMS; kind++) {
+            const int32_t weight = taper_row_weight(booking, (taper_row_kind_t)kind);
+            const int64_t room = rooms->room[k][kind];
+            if (weight > 0 && room != INT64_MAX) {
+                const int64_t fits_mA = room < 0 ? -1 : room / weight;
+                least_mA = fits_mA < least_mA ? fits_mA : least_mA;
+            }
+        }
     }
-    return least;
+    return (int32_t)least_mA;
 }
 
 void taper_rooms_take(taper_rooms_t *rooms, const taper_station_config_t *config, uint8_t i,
-                      int64_t power_mW) {
+                      const taper_booking_t *booking, int32_t current_mA) {
     for (uint8_t k = config->connectors[i].group; k != TAPER_NO_GROUP; k = config->groups[k].parent) {
-        rooms->room_mW[k] -= power_mW;
+        for (int kind = 0; kind < TAPER_ROW_SUMS; kind++) {
+            if (rooms->room[k][kind] != INT64_MAX) {
+                rooms->room[k][kind] -=
+                    (int64_t)taper_row_weight(booking, (taper_row_kind_t)kind) * current_mA;
+            }
+        }
     }
-}
-
-int32_t taper_rooms_W_per_A(const taper_station_config_t *config, const taper_snapshot_t *snapshot,
-                            uint8_t i) {
-    const taper_connector_config_t *connector = &config->connectors[i];
-    if (snapshot->demand[i].active) {
-        return taper_demand_booked_W_per_A(&snapshot->demand[i]);
-    }
-    return taper_max_i32((connector->voltage_mV + 999) / 1000 * connector->phases,
-                         snapshot->demand[i].booked_W_per_A);
 }

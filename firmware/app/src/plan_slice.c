@@ -16,9 +16,9 @@ static bool plan_is_due(const taper_station_t *station, int32_t site_limit_W) {
 }
 
 static void start_plan(taper_station_t *station, int32_t site_limit_W) {
-    int32_t course_W[TAPER_MAX_STEPS];
-    taper_limits_course(&station->limits, station->events.now_ms, course_W);
-    taper_planner_start(&station->planner, &station->snapshot, course_W);
+    taper_course_t course;
+    taper_limits_course(&station->limits, station->events.now_ms, &course);
+    taper_planner_start(&station->planner, &station->snapshot, &course);
     station->planned_limit_W = site_limit_W;
     station->planned_revision = station->sessions.revision;
     station->solve_us = 0;

@@ -1,6 +1,7 @@
 /* Why a connector has the current that it has: what people ask first. */
 #include "station_internal.h"
 #include "taper/battery.h"
+#include "taper/rows.h"
 
 /** Room below this is none: a step of the wire on three phases. */
 static bool is_full(int64_t limit_mW, int64_t sum_mW, int32_t W_per_A) {
@@ -18,7 +19,7 @@ static int64_t group_sum_mW(const taper_station_t *station, uint8_t group) {
         }
         if (k == group && station->snapshot.demand[i].active) {
             sum_mW += (int64_t)station->target.current_mA[i] *
-                      taper_demand_booked_W_per_A(&station->snapshot.demand[i]);
+                      taper_booking_now(station->options.config, &station->snapshot, i).W_per_A;
         }
     }
     return sum_mW;
@@ -27,8 +28,8 @@ static int64_t group_sum_mW(const taper_station_t *station, uint8_t group) {
 /** The limit that leaves no more for a connector, or PLANNED. */
 static taper_reason_t binding_limit(const taper_station_t *station, uint8_t i) {
     const taper_station_config_t *config = station->options.config;
-    const int32_t W_per_A = taper_demand_booked_W_per_A(&station->snapshot.demand[i]);
-    if (is_full((int64_t)station->limit_now.site_W * 1000, group_sum_mW(station, 0), W_per_A)) {
+    const int32_t W_per_A = taper_booking_now(station->options.config, &station->snapshot, i).W_per_A;
+    if (is_full((int64_t)station->limit_now.supply.site_W * 1000, group_sum_mW(station, 0), W_per_A)) {
         return TAPER_REASON_SITE_LIMIT;
     }
     for (uint8_t k = config->connectors[i].group; k != TAPER_NO_GROUP; k = config->groups[k].parent) {
@@ -55,8 +56,8 @@ static taper_reason_t reason_of_current(const taper_station_t *station, uint8_t 
         return TAPER_REASON_VEHICLE_LIMIT;
     }
     const taper_reason_t limit = binding_limit(station, i);
-    return target_mA == 0 && demand->min_mA > 0 && station->limit_now.site_W > 0 ? TAPER_REASON_WAITING
-                                                                                 : limit;
+    return target_mA == 0 && demand->min_mA > 0 && station->limit_now.supply.site_W > 0 ? TAPER_REASON_WAITING
+                                                                                        : limit;
 }
 
 taper_reason_t taper_station_reason(const taper_station_t *station, uint8_t connector) {
@@ -72,4 +73,10 @@ taper_reason_t taper_station_reason(const taper_station_t *station, uint8_t conn
         return TAPER_REASON_STATION;
     }
     return reason_of_current(station, connector);
+}
+
+taper_outlook_t taper_station_outlook(const taper_station_t *station, uint8_t connector) {
+    return (taper_outlook_t){.reason = (uint8_t)taper_station_reason(station, connector),
+                             .soc_at_departure_permille = TAPER_ABSENT,
+                             .short_Wh = TAPER_ABSENT};
 }

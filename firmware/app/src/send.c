@@ -76,7 +76,7 @@ static void send_setpoint(taper_station_t *station, uint8_t i, uint32_t now_ms) 
         return;
     }
     if (taper_station_send_message(station, &message, &station->setpoint_counter[i], now_ms)) {
-        taper_ledger_sent(&station->ledger, i, counter, station->setpoints.current_mA[i], now_ms);
+        taper_ledger_sent(&station->ledger, i, counter, station->setpoints.current_mA[i], 0, now_ms);
         station->sent_mA[i] = station->setpoints.current_mA[i];
         station->sent_session[i] = station->setpoint_session[i];
         station->sent_ms[i] = now_ms;
@@ -139,11 +139,17 @@ static void send_plan(taper_station_t *station, uint8_t i, uint32_t now_ms) {
     taper_message_t message = {.kind = TAPER_MESSAGE_PLAN, .bus = connector->bus, .node = connector->node};
     const bool planned =
         taper_station_has_plan(station) && demand->active && station->plan_session[i] == demand->session;
-    message.as.plan.reason = (uint8_t)taper_station_reason(station, i);
     for (uint8_t t = 0; t < TAPER_PLAN_STEPS; t++) {
         message.as.plan.power_W[t] = planned ? station->plan_W[t][i] : TAPER_ABSENT;
     }
     (void)taper_station_send_message(station, &message, &station->plan_counter[i], now_ms);
+}
+
+static void send_outlook(taper_station_t *station, uint8_t i, uint32_t now_ms) {
+    const taper_connector_config_t *connector = &station->options.config->connectors[i];
+    taper_message_t message = {.kind = TAPER_MESSAGE_OUTLOOK, .bus = connector->bus, .node = connector->node};
+    message.as.outlook = taper_station_outlook(station, i);
+    (void)taper_station_send_message(station, &message, &station->outlook_counter[i], now_ms);
 }
 
 static void send_diag(taper_station_t *station, uint32_t now_ms) {
@@ -166,6 +172,7 @@ void taper_station_send_display(taper_station_t *station, uint32_t now_ms) {
     station->second_ms = now_ms;
     for (unsigned k = 0; k < (connectors + PLAN_ROUND_s - 1u) / PLAN_ROUND_s; k++) {
         send_plan(station, station->next_plan, now_ms);
+        send_outlook(station, station->next_plan, now_ms);
         station->next_plan = (uint8_t)((station->next_plan + 1) % connectors);
     }
     send_diag(station, now_ms);

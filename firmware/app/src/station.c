@@ -81,7 +81,7 @@ static void propose(taper_station_t *station, taper_mode_t mode, int32_t site_li
 }
 
 /** Currents for the proposal that hold every limit, once all connectors have followed. */
-static void allocate(taper_station_t *station, int32_t site_limit_W, uint32_t now_ms) {
+static void allocate(taper_station_t *station, uint32_t now_ms) {
     const taper_station_config_t *config = station->options.config;
     int32_t reserved_mA[TAPER_MAX_CONNECTORS];
     for (uint8_t i = 0; i < config->connector_count; i++) {
@@ -89,8 +89,8 @@ static void allocate(taper_station_t *station, int32_t site_limit_W, uint32_t no
         reserved_mA[i] = online ? 0 : taper_ledger_may_mA(&station->ledger, i);
         station->setpoint_session[i] = taper_session_number(&station->sessions, i);
     }
-    taper_allocate(&station->allocator, config, &station->snapshot, &station->proposal, site_limit_W,
-                   reserved_mA, &station->target);
+    taper_allocate(&station->allocator, config, &station->snapshot, &station->proposal,
+                   &station->limit_now.supply, reserved_mA, &station->target);
     if (station->rival_heard || station->stopped) {
         memset(&station->target, 0, sizeof station->target);
     }
@@ -99,11 +99,11 @@ static void allocate(taper_station_t *station, int32_t site_limit_W, uint32_t no
 /** What of the target is paid for by now. Nothing that the guards refuse gets out. */
 static void grant(taper_station_t *station, taper_setpoints_t *granted) {
     const taper_station_config_t *config = station->options.config;
-    const int32_t site_W = station->limit_now.site_W;
-    taper_ledger_grant(&station->ledger, config, &station->snapshot, station->proposal.rank, site_W,
+    const taper_supply_t *supply = &station->limit_now.supply;
+    taper_ledger_grant(&station->ledger, config, &station->snapshot, station->proposal.rank, supply,
                        &station->target, granted);
-    if (!taper_guard_passes(config, &station->snapshot, site_W, granted) ||
-        !taper_guard_hand_over_passes(&station->ledger, config, &station->snapshot, site_W, granted)) {
+    if (!taper_guard_passes(config, &station->snapshot, supply, granted) ||
+        !taper_guard_hand_over_passes(&station->ledger, config, &station->snapshot, supply, granted)) {
         taper_station_count(station, TAPER_COUNTER_GUARD_VIOLATIONS);
         taper_event_note(&station->events, TAPER_EVENT_GUARD, 0, 0, 0);
         memset(granted, 0, sizeof *granted);
@@ -137,12 +137,13 @@ static void begin(taper_station_t *station, uint32_t now_ms) {
     station->events.unix_s = taper_session_unix_s(&station->sessions, now_ms);
     if (!station->started) {
         station->started = true;
-        taper_ledger_init(&station->ledger, config, taper_station_validity_ms(&station->options), now_ms);
+        taper_ledger_init(&station->ledger, config, taper_station_validity_ms(&station->options),
+                          station->options.time_scale, now_ms);
         taper_event_note(&station->events, TAPER_EVENT_STARTED, 0, 0,
                          taper_saturate_i32(station->record.starts));
     }
     taper_station_receive(station, now_ms);
-    taper_ledger_update(&station->ledger, config, now_ms);
+    taper_ledger_update(&station->ledger, now_ms);
     taper_bus_guard_update(station, now_ms);
     watch_rival(station, now_ms);
 }
@@ -166,13 +167,13 @@ static void forget_identifiers(taper_station_t *station) {
 static void decide(taper_station_t *station, uint32_t now_ms) {
     taper_session_snapshot(&station->sessions, now_ms, &station->snapshot);
     station->limit_now = taper_limits_now(&station->limits, now_ms);
-    taper_station_plan(station, station->limit_now.site_W);
+    taper_station_plan(station, station->limit_now.supply.site_W);
     const taper_mode_t mode = decide_mode(station, now_ms);
     if (mode == TAPER_MODE_INIT) {
-        station->limit_now.site_W = 0;
+        station->limit_now.supply.site_W = 0;
     }
-    propose(station, mode, station->limit_now.site_W);
-    allocate(station, station->limit_now.site_W, now_ms);
+    propose(station, mode, station->limit_now.supply.site_W);
+    allocate(station, now_ms);
     grant(station, &station->setpoints);
 }
 
@@ -230,7 +231,7 @@ taper_mode_t taper_station_mode(const taper_station_t *station) {
 }
 
 int32_t taper_station_site_limit_W(const taper_station_t *station) {
-    return station->limit_now.site_W;
+    return station->limit_now.supply.site_W;
 }
 
 uint32_t taper_station_counter(const taper_station_t *station, taper_counter_t counter) {

@@ -35,6 +35,7 @@ static const route_t routes[] = {
     {TAPER_MESSAGE_EV_PARAM_C, NODE_CONNECTOR, taper_decode_ev_param_c, taper_encode_ev_param_c},
     {TAPER_MESSAGE_EVSE_INFO, NODE_CONNECTOR, taper_decode_evse_info, taper_encode_evse_info},
     {TAPER_MESSAGE_PLAN, NODE_CONNECTOR, taper_decode_plan, taper_encode_plan},
+    {TAPER_MESSAGE_OUTLOOK, NODE_CONNECTOR, taper_decode_outlook, taper_encode_outlook},
     {TAPER_MESSAGE_CTRL_DIAG, NODE_CONTROLLER, taper_decode_ctrl_diag, taper_encode_ctrl_diag},
     {TAPER_MESSAGE_EV_PARAM_D, NODE_CONNECTOR, taper_decode_ev_param_d, taper_encode_ev_param_d},
 };

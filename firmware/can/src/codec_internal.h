@@ -58,6 +58,7 @@ void taper_decode_ev_param_d(const uint8_t *data, taper_message_t *message, tape
 void taper_decode_emcy(const uint8_t *data, taper_message_t *message, taper_decoding_t *decoding);
 void taper_decode_evse_info(const uint8_t *data, taper_message_t *message, taper_decoding_t *decoding);
 void taper_decode_plan(const uint8_t *data, taper_message_t *message, taper_decoding_t *decoding);
+void taper_decode_outlook(const uint8_t *data, taper_message_t *message, taper_decoding_t *decoding);
 void taper_decode_ctrl_diag(const uint8_t *data, taper_message_t *message, taper_decoding_t *decoding);
 
 /** Each: @return false for an enumeration that the wire does not have. */
@@ -76,6 +77,7 @@ bool taper_encode_ev_param_d(const taper_message_t *message, uint8_t *data);
 bool taper_encode_emcy(const taper_message_t *message, uint8_t *data);
 bool taper_encode_evse_info(const taper_message_t *message, uint8_t *data);
 bool taper_encode_plan(const taper_message_t *message, uint8_t *data);
+bool taper_encode_outlook(const taper_message_t *message, uint8_t *data);
 bool taper_encode_ctrl_diag(const taper_message_t *message, uint8_t *data);
 
 #endif

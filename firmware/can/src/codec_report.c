@@ -71,11 +71,6 @@ void taper_decode_plan(const uint8_t *data, taper_message_t *message, taper_deco
     struct taper_dbc_plan_t raw;
     taper_plan_t *plan = &message->as.plan;
     (void)taper_dbc_plan_unpack(&raw, data, TAPER_FRAME_LENGTH);
-    if (!taper_reason_is_named(raw.reason)) {
-        taper_decoding_refuse(decoding);
-        return;
-    }
-    plan->reason = raw.reason;
     plan->power_W[0] = taper_field_decode(&taper_field_plan_power_0, raw.power_0, decoding);
     plan->power_W[1] = taper_field_decode(&taper_field_plan_power_1, raw.power_1, decoding);
     plan->power_W[2] = taper_field_decode(&taper_field_plan_power_2, raw.power_2, decoding);
@@ -84,13 +79,51 @@ void taper_decode_plan(const uint8_t *data, taper_message_t *message, taper_deco
 bool taper_encode_plan(const taper_message_t *message, uint8_t *data) {
     const taper_plan_t *plan = &message->as.plan;
     const struct taper_dbc_plan_t raw = {
-        .reason = plan->reason,
         .power_0 = (uint16_t)taper_field_encode(&taper_field_plan_power_0, plan->power_W[0]),
         .power_1 = (uint16_t)taper_field_encode(&taper_field_plan_power_1, plan->power_W[1]),
         .power_2 = (uint16_t)taper_field_encode(&taper_field_plan_power_2, plan->power_W[2]),
     };
-    return taper_reason_is_named(plan->reason) &&
-           taper_dbc_plan_pack(data, &raw, TAPER_FRAME_LENGTH) == TAPER_FRAME_LENGTH;
+    return taper_dbc_plan_pack(data, &raw, TAPER_FRAME_LENGTH) == TAPER_FRAME_LENGTH;
+}
+
+void taper_decode_outlook(const uint8_t *data, taper_message_t *message, taper_decoding_t *decoding) {
+    struct taper_dbc_outlook_t raw;
+    taper_outlook_t *outlook = &message->as.outlook;
+    (void)taper_dbc_outlook_unpack(&raw, data, TAPER_FRAME_LENGTH);
+    if (!taper_reason_is_named(raw.reason) || !taper_reason_is_named(raw.because)) {
+        taper_decoding_refuse(decoding);
+        return;
+    }
+    outlook->soc_estimated = raw.soc_estimated != 0;
+    outlook->by_energy = raw.by_energy != 0;
+    outlook->departure_passed = raw.departure_passed != 0;
+    outlook->no_clock = raw.no_clock != 0;
+    outlook->reason = raw.reason;
+    outlook->waiting_place = raw.waiting_place;
+    outlook->waiting_of = raw.waiting_of;
+    outlook->soc_at_departure_permille =
+        taper_field_decode(&taper_field_outlook_soc_at_departure, raw.soc_at_departure, decoding);
+    outlook->short_Wh = taper_field_decode(&taper_field_outlook_short_energy, raw.short_energy, decoding);
+    outlook->because = raw.because;
+}
+
+bool taper_encode_outlook(const taper_message_t *message, uint8_t *data) {
+    const taper_outlook_t *outlook = &message->as.outlook;
+    const struct taper_dbc_outlook_t raw = {
+        .soc_estimated = outlook->soc_estimated,
+        .by_energy = outlook->by_energy,
+        .departure_passed = outlook->departure_passed,
+        .no_clock = outlook->no_clock,
+        .reason = outlook->reason,
+        .waiting_place = (uint8_t)taper_min_i32(outlook->waiting_place, 15),
+        .waiting_of = (uint8_t)taper_min_i32(outlook->waiting_of, 15),
+        .soc_at_departure = (uint8_t)taper_field_encode(&taper_field_outlook_soc_at_departure,
+                                                        outlook->soc_at_departure_permille),
+        .short_energy = (uint16_t)taper_field_encode(&taper_field_outlook_short_energy, outlook->short_Wh),
+        .because = outlook->because,
+    };
+    return taper_reason_is_named(outlook->reason) && taper_reason_is_named(outlook->because) &&
+           taper_dbc_outlook_pack(data, &raw, TAPER_FRAME_LENGTH) == TAPER_FRAME_LENGTH;
 }
 
 /* An index without a name is passed on: a tool shows the number. */

@@ -32,17 +32,6 @@ taper_real_t taper_horizon_hessian_neighbour(uint8_t t) {
     return -TAPER_CURVATURE * discount_to((unsigned)t + 1);
 }
 
-bool taper_group_contains(const taper_station_config_t *config, uint8_t k, uint8_t i) {
-    uint8_t group = config->connectors[i].group;
-    for (uint8_t depth = 0; depth < config->group_count && group != TAPER_NO_GROUP; depth++) {
-        if (group == k) {
-            return true;
-        }
-        group = config->groups[group].parent;
-    }
-    return false;
-}
-
 taper_real_t taper_horizon_sum_scale(const taper_station_config_t *config, uint8_t k) {
     uint8_t members = 0;
     for (uint8_t i = 0; i < config->connector_count; i++) {
@@ -173,13 +162,13 @@ static void write_group(taper_horizon_t *horizon, uint8_t k, const int32_t *site
 }
 
 void taper_horizon_build(taper_horizon_t *horizon, const taper_station_config_t *config,
-                         const taper_snapshot_t *snapshot, const int32_t *site_limit_W) {
+                         const taper_snapshot_t *snapshot, const taper_course_t *course) {
     horizon->config = config;
     horizon->base_W = strongest_connector_W(config);
     for (uint8_t i = 0; i < config->connector_count; i++) {
-        write_connector(horizon, i, &snapshot->demand[i], site_limit_W);
+        write_connector(horizon, i, &snapshot->demand[i], course->limit_W);
     }
     for (uint8_t k = 0; k < config->group_count; k++) {
-        write_group(horizon, k, site_limit_W);
+        write_group(horizon, k, course->limit_W);
     }
 }

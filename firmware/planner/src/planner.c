@@ -161,13 +161,13 @@ static uint8_t steps_since(const taper_planner_t *planner, uint32_t now_ms) {
 }
 
 void taper_planner_start(taper_planner_t *planner, const taper_snapshot_t *snapshot,
-                         const int32_t *site_limit_W) {
+                         const taper_course_t *course) {
     taper_horizon_t *horizon = &planner->horizon;
     const uint8_t shift = steps_since(planner, snapshot->now_ms);
     if (!taper_planner_is_usable(planner->verdict) && planner->verdict != TAPER_VERDICT_NONE) {
         reset(planner);
     }
-    taper_horizon_build(horizon, horizon->config, snapshot, site_limit_W);
+    taper_horizon_build(horizon, horizon->config, snapshot, course);
     const bool accepted =
         osqp_update_data_vec(planner->solver->osqp, horizon->linear, horizon->lower, horizon->upper) == 0 &&
         load_matrix(planner);

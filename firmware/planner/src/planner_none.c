@@ -12,10 +12,10 @@ taper_status_t taper_planner_init(taper_planner_t *planner, const taper_solver_t
 }
 
 void taper_planner_start(taper_planner_t *planner, const taper_snapshot_t *snapshot,
-                         const int32_t *site_limit_W) {
+                         const taper_course_t *course) {
     (void)planner;
     (void)snapshot;
-    (void)site_limit_W;
+    (void)course;
 }
 
 taper_verdict_t taper_planner_run(taper_planner_t *planner, uint16_t iterations) {

@@ -1,10 +1,15 @@
 /* What each vehicle wants at one instant. */
 #include <string.h>
 
+#include "taper/rows.h"
+
 #include "session_internal.h"
 
 /* Unix minutes on the wire count modulo this (EV_PARAM_B). */
 #define DEPARTURE_MODULUS_min 65535
+
+/* A current above this flows: less is noise of the measurement. */
+#define FLOWS_mA 500
 
 static int32_t round_down_to_step(int32_t current_mA) {
     return current_mA - current_mA % TAPER_CURRENT_STEP_mA;
@@ -66,22 +71,57 @@ static int32_t volts(const taper_connector_config_t *connector, const taper_sess
     return (voltage_mV + 999) / 1000;
 }
 
-static int32_t phases_in_use(const taper_connector_config_t *connector, const taper_session_t *session) {
-    const int32_t phases = connector->phases;
-    return session->status.phases > 0 ? taper_min_i32(phases, session->status.phases) : phases;
+/* Conductors with a current that cannot be noise. */
+static uint8_t conductors_measured(const taper_session_t *session) {
+    uint8_t most = 0;
+    for (uint8_t k = 0; k < 3; k++) {
+        most = session->status.current_mA[k] > FLOWS_mA ? (uint8_t)(k + 1)
+                                                        : most; /* absent is below any other */
+    }
+    return most;
 }
 
-/* A connector that does not know which phase it is wired to could be on any: it counts on all three. */
-static int32_t phases_booked(const taper_connector_config_t *connector, const taper_session_t *session) {
-    const bool anywhere = session->info_known && session->info.rotation == TAPER_ROTATION_UNKNOWN;
-    return anywhere && !connector->is_dc ? 3 : phases_in_use(connector, session);
+/* What the connector says, but no fewer than carry current. */
+static uint8_t phases_in_use(const taper_connector_config_t *connector, const taper_session_t *session) {
+    const int32_t told = session->status.phases > 0 ? session->status.phases : connector->phases;
+    return (uint8_t)taper_min_i32(connector->phases, taper_max_i32(told, conductors_measured(session)));
 }
 
-/* What 1 A counts for a connector that may still draw, but is not planned for: whatever its phases do by now. */
-static int32_t most_booked_W_per_A(const taper_connector_config_t *connector, const taper_session_t *session,
-                                   uint32_t now_ms) {
-    const int32_t phases = taper_max_i32(connector->phases, phases_booked(connector, session));
-    return volts(connector, session, now_ms) * phases;
+/* Supply phases of the first `conductors`: by the description, and by what the connector says of its wiring; one that does
+   not know counts on all of them. */
+static uint8_t phases_booked(const taper_connector_config_t *connector, const taper_session_t *session,
+                             uint8_t conductors) {
+    const uint8_t described = taper_rotation_phases((taper_rotation_t)connector->rotation, conductors);
+    if (!session->info_known) {
+        return described;
+    }
+    const taper_rotation_t told = (taper_rotation_t)session->info.rotation;
+    return told == TAPER_ROTATION_UNKNOWN ? 7 : described | taper_rotation_phases(told, conductors);
+}
+
+static int32_t count_phases(uint8_t phases) {
+    return (phases & 1) + (phases >> 1 & 1) + (phases >> 2 & 1);
+}
+
+/* What 1 A of a connector counts with `conductors` in use. Where its wiring is in doubt, it counts on more phases than it
+   uses, in current and in power. */
+static taper_booking_t booking_of(const taper_session_table_t *table, uint8_t connector, uint32_t now_ms,
+                                  uint8_t conductors) {
+    const taper_connector_config_t *config = &table->config->connectors[connector];
+    const taper_session_t *session = &table->session[connector];
+    taper_booking_t booking = taper_booking_nominal(table->config, connector);
+    const int32_t volts_V = volts(config, session, now_ms);
+    if (config->is_dc) {
+        const int32_t nominal_V = (config->voltage_mV + 999) / 1000;
+        booking.W_per_A = (int32_t)(((int64_t)booking.W_per_A * volts_V + nominal_V - 1) / nominal_V);
+        booking.permille = (int32_t)(((int64_t)booking.permille * volts_V + nominal_V - 1) / nominal_V);
+        return booking;
+    }
+    const uint8_t wires = config->line_to_line ? 2 : conductors;
+    booking.phases = phases_booked(config, session, wires);
+    const int32_t beside = count_phases(booking.phases) - wires; /* phases that it might use instead */
+    booking.W_per_A = volts_V * (conductors + beside);
+    return booking;
 }
 
 /* minimum <= target <= maximum, repaired by moving the target; where the bounds contradict, the maximum holds. */
@@ -165,7 +205,8 @@ bool taper_session_demand(const taper_session_table_t *table, uint8_t connector,
     const taper_connector_config_t *config = &table->config->connectors[connector];
     const taper_session_t *session = &table->session[connector];
     memset(demand, 0, sizeof *demand);
-    demand->booked_W_per_A = most_booked_W_per_A(config, session, now_ms);
+    demand->booking =
+        booking_of(table, connector, now_ms, config->phases); /* whatever its phases do by now */
     if (obstacle(table, connector, now_ms) != TAPER_REASON_PLANNED) {
         return false;
     }
@@ -182,7 +223,7 @@ bool taper_session_demand(const taper_session_table_t *table, uint8_t connector,
     demand->max_mA = max_mA;
     demand->min_mA = min_mA;
     demand->W_per_A = voltage_V * phases_in_use(config, session);
-    demand->booked_W_per_A = voltage_V * phases_booked(config, session);
+    demand->booking = booking_of(table, connector, now_ms, phases_in_use(config, session));
     demand->departs_in_s = departs_in_s(table, session, now_ms);
     fill_battery(demand, session, now_ms);
     return true;

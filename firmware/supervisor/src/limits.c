@@ -166,24 +166,25 @@ static int32_t curve_W(const taper_limits_t *limits, int32_t point) {
 }
 
 /** What site, gateway and curve allow, before anything is taken off. */
-static taper_limit_now_t supply(const taper_limits_t *limits, uint32_t now_ms) {
+static taper_limit_now_t supply_of(const taper_limits_t *limits, uint32_t now_ms) {
     const int32_t built_W = limits->config->groups[0].limit_W;
     const int32_t known_W = curve_W(limits, point_at(&limits->curve, world_ms(limits, now_ms)));
     if (!taper_limits_gateway_alive(limits, now_ms)) {
-        return (taper_limit_now_t){.site_W = taper_min_i32(known_W, limits->failsafe_W),
+        return (taper_limit_now_t){.supply = taper_supply_of_W(taper_min_i32(known_W, limits->failsafe_W)),
                                    .source = TAPER_LIMIT_FAILSAFE};
     }
     if (limits->gateway_W < known_W) {
-        return (taper_limit_now_t){.site_W = limits->gateway_W, .source = TAPER_LIMIT_GATEWAY};
+        return (taper_limit_now_t){.supply = taper_supply_of_W(limits->gateway_W),
+                                   .source = TAPER_LIMIT_GATEWAY};
     }
-    return (taper_limit_now_t){.site_W = known_W,
+    return (taper_limit_now_t){.supply = taper_supply_of_W(known_W),
                                .source = known_W < built_W ? TAPER_LIMIT_CURVE : TAPER_LIMIT_STATION};
 }
 
 taper_limit_now_t taper_limits_now(const taper_limits_t *limits, uint32_t now_ms) {
-    taper_limit_now_t now = supply(limits, now_ms);
+    taper_limit_now_t now = supply_of(limits, now_ms);
     now.other_W = taper_limits_other_W(limits, now_ms);
-    now.site_W = taper_max_i32(now.site_W - now.other_W, 0);
+    now.supply.site_W = taper_max_i32(now.supply.site_W - now.other_W, 0);
     return now;
 }
 
@@ -210,17 +211,22 @@ static int32_t mean_W(const taper_limits_t *limits, uint32_t from_ms, uint32_t l
     return taper_saturate_i32(sum / length_ms);
 }
 
-void taper_limits_course(const taper_limits_t *limits, uint32_t now_ms, int32_t *course_W) {
+void taper_limits_course(const taper_limits_t *limits, uint32_t now_ms, taper_course_t *course) {
     const taper_station_config_t *config = limits->config;
     const uint32_t step_ms = config->step_s * UINT32_C(1000);
     const uint32_t from_ms = world_ms(limits, now_ms);
     const int32_t other_W = taper_limits_other_W(limits, now_ms);
-    const int32_t present_W = supply(limits, now_ms).site_W;
+    const int32_t present_W = supply_of(limits, now_ms).supply.site_W;
     int32_t point = point_at(&limits->curve, from_ms);
     const bool explained = present_W + WIRE_STEP_W > curve_W(limits, point);
+    memset(course, 0, sizeof *course);
+    for (unsigned phase = 0; phase < 3; phase++) {
+        course->phase_mA[phase] = TAPER_NO_LIMIT;
+    }
     for (uint8_t t = 0; t < config->steps; t++) {
         const int32_t known_W = mean_W(limits, from_ms + t * step_ms, step_ms, &point);
-        course_W[t] = taper_max_i32((explained ? known_W : taper_min_i32(known_W, present_W)) - other_W, 0);
+        course->limit_W[t] =
+            taper_max_i32((explained ? known_W : taper_min_i32(known_W, present_W)) - other_W, 0);
     }
-    course_W[0] = taper_max_i32(present_W - other_W, 0);
+    course->limit_W[0] = taper_max_i32(present_W - other_W, 0);
 }

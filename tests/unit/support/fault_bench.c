@@ -141,7 +141,7 @@ taper_setpoint_t fault_setpoint(uint8_t node) {
 }
 
 taper_reason_t fault_reason(uint8_t node) {
-    return (taper_reason_t)told(TAPER_MESSAGE_PLAN, node).as.plan.reason;
+    return (taper_reason_t)told(TAPER_MESSAGE_OUTLOOK, node).as.outlook.reason;
 }
 
 taper_ctrl_status_t fault_status(void) {

@@ -5,7 +5,14 @@
 static const taper_connector_config_t connectors[] = {
     {.min_mA = 6000, .max_mA = 32000, .voltage_mV = 230000, .phases = 3, .group = 0, .bus = 0, .node = 1},
     {.min_mA = 6000, .max_mA = 32000, .voltage_mV = 230000, .phases = 1, .group = 0, .bus = 0, .node = 2},
-    {.min_mA = 0, .max_mA = 200000, .voltage_mV = 400000, .phases = 1, .bus = 0, .node = 3, .is_dc = true},
+    {.min_mA = 0,
+     .max_mA = 200000,
+     .voltage_mV = 400000,
+     .phases = 1,
+     .efficiency_permille = 1000,
+     .bus = 0,
+     .node = 3,
+     .is_dc = true},
 };
 static const taper_group_config_t groups[] = {{.limit_W = 100000, .parent = TAPER_NO_GROUP}};
 static const taper_station_config_t station = {

@@ -146,6 +146,7 @@ typedef struct {
     bool stopped;
     uint8_t setpoint_counter[TAPER_MAX_CONNECTORS];
     uint8_t plan_counter[TAPER_MAX_CONNECTORS];
+    uint8_t outlook_counter[TAPER_MAX_CONNECTORS];
     uint8_t setpoint_session[TAPER_MAX_CONNECTORS]; /**< whom the setpoints were decided for */
     int32_t sent_mA[TAPER_MAX_CONNECTORS];          /**< what was last sent; negative: nothing that counts */
     uint8_t sent_session[TAPER_MAX_CONNECTORS];     /**< and for whom */
@@ -207,6 +208,9 @@ const taper_event_log_t *taper_station_events(const taper_station_t *station);
 
 /** Why a connector has the current that it has, by the last step. */
 taper_reason_t taper_station_reason(const taper_station_t *station, uint8_t connector);
+
+/** What to tell the driver of a connector's vehicle, by the last step. Cost: O(connectors). */
+taper_outlook_t taper_station_outlook(const taper_station_t *station, uint8_t connector);
 
 /** Whether some connector waits for what another has yet to give up: the next poll may have more for it. */
 bool taper_station_hands_over(const taper_station_t *station);

@@ -24,6 +24,7 @@
 #include <stdint.h>
 
 #include "taper/real.h"
+#include "taper/rows.h"
 #include "taper/types.h"
 
 /** Discount per step: charging early is worth more, so power is used when it is there. */
@@ -46,11 +47,11 @@ typedef struct {
 } taper_horizon_t;
 
 /**
- * State the problem for `snapshot`. `site_limit_W[t]` is the site's limit in step t, >= 0, [config->steps].
+ * State the problem for `snapshot` and what is known of the coming steps.
  * Cost: O(connectors x steps + groups x (steps + connectors x depth of the tree)). `horizon->config` is `config` afterwards.
  */
 void taper_horizon_build(taper_horizon_t *horizon, const taper_station_config_t *config,
-                         const taper_snapshot_t *snapshot, const int32_t *site_limit_W);
+                         const taper_snapshot_t *snapshot, const taper_course_t *course);
 
 /** Quadratic cost on v(i,t)^2 (diagonal of the Hessian), the same for all connectors. */
 taper_real_t taper_horizon_hessian_diagonal(uint8_t steps, uint8_t t);
@@ -71,8 +72,5 @@ static inline size_t taper_first_sum_row(const taper_station_config_t *config) {
 
 /** Factor of the sum rows of group `k`: sqrt(5 / connectors in it), 0 for a group without any. */
 taper_real_t taper_horizon_sum_scale(const taper_station_config_t *config, uint8_t k);
-
-/** Whether connector `i` hangs below group `k` of the feeder tree. */
-bool taper_group_contains(const taper_station_config_t *config, uint8_t k, uint8_t i);
 
 #endif

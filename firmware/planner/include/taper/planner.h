@@ -30,6 +30,8 @@ typedef enum {
     TAPER_VERDICT_LATE = 4,       /**< out of iterations, not usable */
     TAPER_VERDICT_NOT_FINITE = 5, /**< NaN or infinite values */
     TAPER_VERDICT_REFUSED = 6,    /**< the solver refused the data or called a feasible problem infeasible */
+    TAPER_VERDICT_RESIDUAL = 7,   /**< called solved, but the rows do not hold within the tolerance */
+    TAPER_VERDICT_OFF = 8,        /**< not asked: see taper_health_t */
 } taper_verdict_t;
 
 typedef struct {
@@ -55,10 +57,10 @@ taper_status_t taper_planner_init(taper_planner_t *planner, const taper_solver_t
 /**
  * State a new problem. The last usable answer, moved on in time, is the starting point; after a problem that was dropped
  * or had no usable answer, the solver starts from nothing.
- * `site_limit_W` as in taper_horizon_build(). Cost: O(rows), and one or two factorisations.
+ * `course` as in taper_horizon_build(). Cost: O(rows), and one or two factorisations.
  */
 void taper_planner_start(taper_planner_t *planner, const taper_snapshot_t *snapshot,
-                         const int32_t *site_limit_W);
+                         const taper_course_t *course);
 
 /**
  * Work one slice of at most `iterations` on the present problem, rounded down to a multiple of TAPER_MIN_SLICE but at

@@ -44,8 +44,8 @@ typedef struct {
 } taper_limits_t;
 
 typedef struct {
-    int32_t site_W;  /**< for charging, >= 0 */
-    int32_t other_W; /**< taken off for what else the site draws */
+    taper_supply_t supply; /**< for charging */
+    int32_t other_W;       /**< taken off for what else the site draws */
     taper_limit_source_t source;
 } taper_limit_now_t;
 
@@ -86,10 +86,9 @@ int32_t taper_limits_other_W(const taper_limits_t *limits, uint32_t now_ms);
 taper_limit_now_t taper_limits_now(const taper_limits_t *limits, uint32_t now_ms);
 
 /**
- * What is known of the limit for planning: `course_W[t]` for steps of `config->step_s` from `now_ms` on,
- * [config->steps]. The running step has the limit of now; later ones the mean over the step. A present limit that the
+ * What is known for planning, in steps of `config->step_s` from `now_ms` on, [config->steps]. The running step has the limit of now; later ones the mean over the step. A present limit that the
  * curve does not explain is taken to last. Cost: O(steps + points).
  */
-void taper_limits_course(const taper_limits_t *limits, uint32_t now_ms, int32_t *course_W);
+void taper_limits_course(const taper_limits_t *limits, uint32_t now_ms, taper_course_t *course);
 
 #endif

@@ -1,14 +1,15 @@
 /**
- * The mode machine. What it is told decides; it remembers only the time of the start, and whether it has left INIT.
+ * The supervisor: which proposal is used, whether the planner is asked at all, and whether this controller still trusts
+ * itself. Modes, deadlines and ways back are one table, in supervisor.c; every row is left by itself as soon as its
+ * condition ends, and nothing is remembered but what stands in the structs below.
  *
- * | heard from the gateway               | policy has a proposal | mode     |
- * |--------------------------------------|-----------------------|----------|
- * | never, up to TAPER_INIT_ms           | -                     | INIT     |
- * | never, later; or silent for too long | -                     | FAILSAFE |
- * | yes                                  | yes                   | PLAN     |
- * | yes                                  | no                    | FALLBACK |
- *
- * Every row is left by itself as soon as its condition ends.
+ * | condition, the first that holds                      | mode     | deadline          | way back                      |
+ * |------------------------------------------------------|----------|-------------------|-------------------------------|
+ * | gateway never heard, at most TAPER_INIT_ms since the start | INIT | TAPER_INIT_ms | its first limit               |
+ * | gateway never heard, or silent for too long          | FAILSAFE | same tick         | a limit (limits.h)            |
+ * | the last tick took too long                          | FALLBACK | next tick         | a tick in time                |
+ * | no usable proposal: none yet, late, not finite, refused, off | FALLBACK | same tick | the next good plan            |
+ * | otherwise                                            | PLAN     | -                 |                               |
  */
 #ifndef TAPER_SUPERVISOR_H
 #define TAPER_SUPERVISOR_H
@@ -20,10 +21,17 @@
 
 /** Longest wait for the gateway's first limit after a start [ms]; then the failsafe limit applies. */
 #define TAPER_INIT_ms 10000
+/** Plans in a row that are no good, and how long the planner is left alone then [ms] (docs/protocol.md, fault 24). */
+#define TAPER_BAD_PLANS      3
+#define TAPER_PLANNER_OFF_ms UINT32_C(600000)
+/** Ticks in a row that took too long, or setpoints found flipped: the watchdog is left to bite (faults 47, 48). */
+#define TAPER_RESET_OVERRUNS 2
+#define TAPER_RESET_FLIPS    2
 
 typedef struct {
     bool gateway_alive;  /**< a limit of the gateway is in force */
     bool gateway_heard;  /**< there ever was one */
+    bool tick_overran;   /**< the last tick took too long */
     bool proposal_ready; /**< the configured policy has an answer to use now */
 } taper_situation_t;
 
@@ -39,5 +47,35 @@ void taper_supervisor_init(taper_supervisor_t *supervisor);
 /** Decide the mode at `now_ms`. Cost: constant. */
 taper_mode_t taper_supervisor_update(taper_supervisor_t *supervisor, const taper_situation_t *situation,
                                      uint32_t now_ms);
+
+/** What the planner's answers were worth. Zero-initialised: it is trusted. */
+typedef struct {
+    uint8_t bad; /**< in a row */
+    bool off;
+    uint32_t off_ms; /**< since when */
+} taper_health_t;
+
+/** An answer came at `now_ms`. @return whether it turned the planner off. */
+bool taper_health_judge(taper_health_t *health, bool usable, uint32_t now_ms);
+
+/** Whether the planner may be asked at `now_ms`. After TAPER_PLANNER_OFF_ms it may again, and one more bad answer turns
+    it off. @return false while it is off. */
+bool taper_health_may_plan(taper_health_t *health, uint32_t now_ms);
+
+/** Faults of this controller itself. Zero-initialised: none. */
+typedef struct {
+    bool overran;     /**< the last tick did */
+    uint8_t overruns; /**< in a row */
+    uint8_t flips;    /**< setpoints that differed from their inverse, ever, up to TAPER_RESET_FLIPS */
+} taper_self_t;
+
+/** A tick took `took_ms` of `tick_ms`. @return whether that is too long. */
+bool taper_self_ticked(taper_self_t *self, uint32_t took_ms, uint32_t tick_ms);
+
+/** A setpoint differed from its inverse. */
+void taper_self_flipped(taper_self_t *self);
+
+/** Whether the watchdog is to be kicked: false once this controller should rather be restarted. */
+bool taper_self_is_sound(const taper_self_t *self);
 
 #endif

@@ -142,9 +142,19 @@ typedef struct {
 
 /** PLAN, controller to all, each connector every few seconds: for display and for the vehicle's schedule, not control. */
 typedef struct {
-    uint8_t reason;     /**< taper_reason_t: why the connector has the current that it has */
     int32_t power_W[3]; /**< 0..655 340, planned for this step and the next two, or absent */
 } taper_plan_t;
+
+/** OUTLOOK, controller to all, each connector every few seconds: what to tell the driver. */
+typedef struct {
+    bool soc_estimated, by_energy, departure_passed, no_clock;
+    uint8_t reason;                    /**< taper_reason_t: why the connector has the current that it has */
+    uint8_t waiting_place;             /**< 0..15 */
+    uint8_t waiting_of;                /**< 0..15 */
+    int32_t soc_at_departure_permille; /**< 0..1000, or absent */
+    int32_t short_Wh;                  /**< 0..655 340 missing at departure, or absent */
+    uint8_t because;                   /**< taper_reason_t: for which limit */
+} taper_outlook_t;
 
 /** CTRL_DIAG, controller to all, 1 s, one counter after the other. */
 typedef struct {
@@ -163,6 +173,7 @@ typedef struct {
         taper_site_meter_t site_meter;
         taper_evse_info_t evse_info;
         taper_plan_t plan;
+        taper_outlook_t outlook;
         taper_ctrl_diag_t ctrl_diag;
         taper_site_limit_t site_limit;
         taper_setpoint_t setpoint;

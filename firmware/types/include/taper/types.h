@@ -29,6 +29,8 @@ typedef enum {
 #define TAPER_NO_GROUP UINT8_MAX
 /** A quantity that a sender did not give. Never a legal value of any field. */
 #define TAPER_ABSENT INT32_MIN
+/** A bound that is not there, among those worked out at run time. */
+#define TAPER_NO_LIMIT INT32_MAX
 /** Step of every setpoint on the wire [mA] (SETPOINT, 0.1 A). */
 #define TAPER_CURRENT_STEP_mA 100
 /** Steps of the known site limit that a station keeps. */
@@ -80,20 +82,37 @@ static inline void taper_count(uint32_t *counter) {
 
 /** One connector as the station file describes it. Constant. */
 typedef struct {
-    int32_t min_mA;     /**< least current that can be offered (IEC 61851-1: 6 A on AC); 0: continuous */
-    int32_t max_mA;     /**< hardware and cable limit, per phase */
-    int32_t voltage_mV; /**< nominal voltage, phase to neutral on AC */
-    uint8_t phases;     /**< 1 or 3 on AC, 1 on DC */
-    uint8_t group;      /**< innermost group of the feeder tree */
-    uint8_t bus;        /**< CAN bus, from 0 */
-    uint8_t node;       /**< node on that bus, 1..TAPER_NODES_PER_BUS */
-    bool is_dc;
+    int32_t min_mA; /**< least current that can be offered (IEC 61851-1: 6 A on AC); 0: continuous */
+    int32_t max_mA; /**< hardware and cable limit, per phase */
+    int32_t
+        fallback_mA; /**< what it may draw without a controller, if the failsafe limit has room for it; 0, or at
+                              least min_mA */
+    int32_t voltage_mV; /**< nominal voltage: phase to neutral on AC, line to line where `line_to_line` */
+    uint32_t
+        reaction_ms; /**< longest time in which its vehicle follows a lower setpoint (IEC 61851-1: 5 s) */
+    uint16_t efficiency_permille; /**< of the DC converter, 1..1000; 1000 on AC */
+    uint8_t phases;               /**< 1 or 3 on AC, 1 on DC */
+    uint8_t
+        rotation; /**< taper_rotation_t: supply phases of its conductors L1, L2, L3; with one phase the first, line to
+                             line the first two count; never unknown */
+    bool line_to_line; /**< one phase between two lines (North America) */
+    uint8_t group;     /**< innermost group of the feeder tree */
+    uint8_t bus;       /**< CAN bus, from 0 */
+    uint8_t node;      /**< node on that bus, 1..TAPER_NODES_PER_BUS */
+    bool is_dc;        /**< draws from all three phases, through its converter */
 } taper_connector_config_t;
 
-/** One node of the feeder tree. Group 0 is the site; a parent always stands before its children. */
+/**
+ * One node of the feeder tree. Group 0 is the site; a parent always stands before its children. A limit of 0 is
+ * none; the site has one in W. The others bound the current of each phase (rows.h).
+ */
 typedef struct {
     int32_t limit_W;
-    uint8_t parent; /**< TAPER_NO_GROUP for group 0 */
+    int32_t limit_mA; /**< on each phase */
+    int32_t
+        delta_mA; /**< on each line of the delta side of a transformer that feeds it, times its ratio of windings */
+    int32_t imbalance_mA; /**< most that the sums of the setpoints of two phases may differ */
+    uint8_t parent;       /**< TAPER_NO_GROUP for group 0 */
 } taper_group_config_t;
 
 /** A station: what codegen makes of `codegen/stations/NAME.toml`. Constant, in flash. */
@@ -103,44 +122,63 @@ typedef struct {
     const taper_group_config_t *groups;         /**< [group_count] */
     int32_t failsafe_W;                         /**< site limit while the gateway is silent */
     int32_t other_load_W;    /**< most that the site draws besides: assumed while its meter is silent */
+    int32_t other_load_mA;   /**< and the most of it on one phase */
     int32_t site_voltage_mV; /**< phase to neutral, turns the meter's currents into power */
     uint32_t tick_ms;        /**< control tick */
     uint32_t min_on_ms;      /**< a connector that was switched on stays on this long */
     uint32_t min_off_ms;     /**< and off this long, for the contactor's and vehicle's sake */
-    uint16_t step_s;         /**< length of a planning step */
-    uint8_t steps;           /**< planning steps, the horizon */
+    uint32_t turn_ms;        /**< where the minimum currents do not all fit: longest turn while others wait */
+    uint32_t change_ms;      /**< least time from one change of a setpoint to an increase */
+    int32_t ramp_mA_per_s;   /**< steepest increase; 0: at once */
+    int32_t deadband_mA;     /**< smaller increases wait; 0: none */
+    int32_t price_weight_permille; /**< of the price against having energy early, 0 (none)..1000 */
+    bool line_to_line;             /**< some connector is */
+    uint16_t step_s;               /**< length of a planning step */
+    uint8_t steps;                 /**< planning steps, the horizon */
     uint8_t connector_count;
     uint8_t group_count;
 } taper_station_config_t;
 
-/**
- * One vehicle's demand at the instant of a snapshot. Meaningless unless `active`, but for `booked_W_per_A`: by that, or by
- * its description if that is more, counts what a connector without a demand may still draw.
- */
+/** How the current of a connector shows in its supply: what counts against limits. */
 typedef struct {
-    bool active;            /**< a vehicle is there, is sound, and still wants energy */
-    bool soc_estimated;     /**< `stored_Wh` rests on measured energy because the reported SOC is stale */
-    uint8_t session;        /**< wire number of the session on this connector */
-    int32_t stored_Wh;      /**< energy in the battery, >= 0; 0 if SOC or capacity is unknown */
-    int32_t capacity_Wh;    /**< > 0, or 0: unknown (no taper then) */
-    int32_t need_Wh;        /**< energy still wanted, > 0 */
-    int32_t peak_W;         /**< what the vehicle takes at SOC 0, >= 0 */
-    int32_t taper_W;        /**< fall of that from SOC 0 to SOC 1, 0..peak_W */
-    int32_t max_mA;         /**< least of connector and vehicle limit, per phase */
-    int32_t min_mA;         /**< greatest of connector and vehicle minimum */
-    int32_t W_per_A;        /**< power of 1 A on each phase in use, > 0 */
-    int32_t booked_W_per_A; /**< counts against limits; more than W_per_A while its phases are not known */
-    int32_t departs_in_s;   /**< time to the departure that the vehicle told; <= 0: it has passed */
+    int32_t W_per_A;   /**< power of 1 A of setpoint, with the converter's losses; 0: by the description */
+    int32_t permille;  /**< current on each of `phases` for 1 A of setpoint */
+    uint8_t phases;    /**< of the supply: bit 0 L1 .. bit 2 L3; 0: by the description */
+    bool line_to_line; /**< it flows between the two `phases` */
+} taper_booking_t;
+
+/** What the site may draw for charging at one instant. */
+typedef struct {
+    int32_t site_W; /**< >= 0 */
+    int32_t
+        phase_mA[3]; /**< of the limits of group 0, what other load leaves; TAPER_NO_LIMIT: as described */
+} taper_supply_t;
+
+/** A supply that is bounded by nothing but `site_W` and the station's description. */
+static inline taper_supply_t taper_supply_of_W(int32_t site_W) {
+    return (taper_supply_t){.site_W = site_W, .phase_mA = {TAPER_NO_LIMIT, TAPER_NO_LIMIT, TAPER_NO_LIMIT}};
+}
+
+/** One vehicle's demand at the instant of a snapshot. Meaningless unless `active`, but for `booking`, which holds always. */
+typedef struct {
+    bool active;             /**< a vehicle is there, is sound, and still wants energy */
+    bool soc_estimated;      /**< `stored_Wh` rests on measured energy because the reported SOC is stale */
+    uint8_t session;         /**< wire number of the session on this connector */
+    int32_t stored_Wh;       /**< energy in the battery, >= 0; 0 if SOC or capacity is unknown */
+    int32_t capacity_Wh;     /**< > 0, or 0: unknown (no taper then) */
+    int32_t need_Wh;         /**< energy still wanted, > 0 */
+    int32_t peak_W;          /**< what the vehicle takes at SOC 0, >= 0 */
+    int32_t taper_W;         /**< fall of that from SOC 0 to SOC 1, 0..peak_W */
+    int32_t max_mA;          /**< least of connector and vehicle limit, per phase */
+    int32_t min_mA;          /**< greatest of connector and vehicle minimum */
+    int32_t W_per_A;         /**< power of 1 A on each phase in use, > 0 */
+    int32_t departs_in_s;    /**< time to the departure that the vehicle told; <= 0: it has passed */
+    taper_booking_t booking; /**< counts against limits; more than it draws while its phases are not known */
 } taper_demand_t;
 
 /** What connector and vehicle allow, whatever the battery takes [W]. */
 static inline int32_t taper_demand_allowed_W(const taper_demand_t *demand) {
     return taper_saturate_i32((int64_t)demand->max_mA * demand->W_per_A / 1000);
-}
-
-/** What 1 A on each phase in use counts against limits [W]. */
-static inline int32_t taper_demand_booked_W_per_A(const taper_demand_t *demand) {
-    return taper_max_i32(demand->booked_W_per_A, demand->W_per_A);
 }
 
 /** All demands at one instant: the only thing that horizon and fallback see of the world. */
@@ -161,6 +199,30 @@ typedef struct {
     uint16_t count;
     taper_limit_point_t point[TAPER_MAX_LIMIT_POINTS];
 } taper_limit_curve_t;
+
+/** Longest known course of the price of energy. */
+#define TAPER_MAX_PRICE_POINTS 200
+
+/** From `time_ms` on, until the next point, a kWh costs `milli_per_kWh` thousandths of the currency's unit. May be < 0. */
+typedef struct {
+    uint32_t time_ms;
+    int32_t milli_per_kWh;
+} taper_price_point_t;
+
+/** Known course of the price, times ascending. Before its first point, and 24 h after its last, it says nothing. */
+typedef struct {
+    uint16_t count;
+    taper_price_point_t point[TAPER_MAX_PRICE_POINTS];
+} taper_price_curve_t;
+
+/** What is known of the coming planning steps, [config->steps]. */
+typedef struct {
+    int32_t limit_W[TAPER_MAX_STEPS]; /**< of the site, for charging, >= 0 */
+    uint8_t source[TAPER_MAX_STEPS];  /**< taper_limit_source_t: whose limit it is */
+    int32_t phase_mA[3]; /**< as in taper_supply_t: what other load leaves now is taken to last */
+    bool priced;         /**< the price of every step is known */
+    int32_t milli_per_kWh[TAPER_MAX_STEPS];
+} taper_course_t;
 
 /**
  * What a planner or a fallback asks for. It binds nobody: any bit pattern is safe, the allocator bounds it.

@@ -1,0 +1,68 @@
+/**
+ * What vehicles really draw, against what they were told (docs/protocol.md, faults 41 to 43).
+ *
+ * | draws                                                  | for  | then                                              |
+ * |--------------------------------------------------------|------|---------------------------------------------------|
+ * | more than (setpoint + 0.5 A) x 1.10                    | at once | what it draws is booked                        |
+ * | the same                                               | 7 s  | OVER: it gets nothing                             |
+ * | more than 1 A, while OVER                              | 10 s | LOCKED: stop and open, nothing until it is unplugged |
+ * | more than 1 A, after a setpoint of 0                   | 6 s  | LOCKED                                            |
+ * | less than setpoint - 2 A                               | 60 s | its maximum becomes what it draws and 2 A more    |
+ * | within 1 A of that maximum                             | at once | it has its own maximum again                   |
+ *
+ * OVER ends when it has drawn at most 1 A for TAPER_DRAW_CALM_ms. A setpoint counts as told from when it was sent; one that was lowered
+ * binds only after the connector's `reaction_ms`: before, the highest of the last while does.
+ */
+#ifndef TAPER_DRAW_H
+#define TAPER_DRAW_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "taper/types.h"
+
+#define TAPER_DRAW_OVER_ms    UINT32_C(7000)
+#define TAPER_DRAW_OPEN_ms    UINT32_C(10000)
+#define TAPER_DRAW_IGNORES_ms UINT32_C(6000)
+#define TAPER_DRAW_UNUSED_ms  UINT32_C(60000)
+#define TAPER_DRAW_CALM_ms    UINT32_C(60000)
+/** Margins [mA]. */
+#define TAPER_DRAW_FLOWS_mA  1000 /**< more than this flows */
+#define TAPER_DRAW_UNUSED_mA 2000 /**< left unused, and given again above what is drawn */
+#define TAPER_DRAW_ASKS_mA   1000 /**< this close to its maximum it wants more */
+
+typedef enum {
+    TAPER_DRAW_NORMAL = 0,
+    TAPER_DRAW_OVER = 1,   /**< gets nothing for a while */
+    TAPER_DRAW_LOCKED = 2, /**< stop and open; until it is unplugged */
+} taper_draw_state_t;
+
+/** What is known of one connector at one instant. */
+typedef struct {
+    bool plugged;    /**< a vehicle is there */
+    uint8_t session; /**< another one begins anew, but for LOCKED, which only unplugging ends */
+    int32_t
+        allowed_mA; /**< the most that it was told and has not had time to leave: taper_ledger_told_mA() */
+    int32_t setpoint_mA; /**< what was sent last */
+    int32_t measured_mA; /**< the greatest of its phases, or absent: old or not told */
+    int32_t min_mA;      /**< least current that it can be offered */
+} taper_draw_report_t;
+
+typedef struct {
+    taper_draw_state_t state;
+    bool over, ignoring, flowing, unused, calm; /**< the condition holds since .._ms */
+    uint8_t session;
+    uint32_t over_ms, ignoring_ms, flowing_ms, unused_ms, calm_ms;
+    int32_t cap_mA; /**< most that is of use to it; TAPER_NO_LIMIT: its own maximum */
+} taper_draw_t;
+
+/** Nothing against it. */
+void taper_draw_init(taper_draw_t *draw);
+
+/** Take in what is known at `now_ms`. @return whether the state or the cap changed. Cost: constant. */
+bool taper_draw_update(taper_draw_t *draw, const taper_draw_report_t *report, uint32_t now_ms);
+
+/** Most that a setpoint of `allowed_mA` may be over-drawn by before it counts: (allowed + 0.5 A) x 1.10. */
+int32_t taper_draw_tolerated_mA(int32_t allowed_mA);
+
+#endif

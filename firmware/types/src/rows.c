@@ -1,0 +1,182 @@
+#include "taper/rows.h"
+
+/** sqrt(3) - 1, rounded up [permille]. */
+#define FACET_permille 733
+#define FULL_permille  1000
+/** Three-phase current on a delta side: sqrt(3), rounded up to what a connector of unknown wiring counts. */
+#define DELTA_MOST_permille 2000
+
+typedef enum { FAMILY_POWER, FAMILY_LINE, FAMILY_DELTA, FAMILY_DIFFERENCE } family_t;
+
+/** Place of a kind in its family: which line (0..2) and which of its two rows. */
+typedef struct {
+    family_t family;
+    uint8_t line;
+    bool second;
+} place_t;
+
+static place_t place_of(taper_row_kind_t kind) {
+    if (kind == TAPER_ROW_POWER) {
+        return (place_t){.family = FAMILY_POWER};
+    }
+    if (kind >= TAPER_ROW_L1_L2) {
+        return (place_t){.family = FAMILY_DIFFERENCE, .line = (uint8_t)(kind - TAPER_ROW_L1_L2)};
+    }
+    const unsigned at = (unsigned)kind - TAPER_ROW_L1;
+    return (place_t){
+        .family = at < 6u ? FAMILY_LINE : FAMILY_DELTA, .line = (uint8_t)(at % 3u), .second = at % 6u >= 3u};
+}
+
+int32_t taper_row_limit(const taper_station_config_t *config, uint8_t group, taper_row_kind_t kind) {
+    const taper_group_config_t *limits = &config->groups[group];
+    const place_t place = place_of(kind);
+    if (place.second && !config->line_to_line) {
+        return TAPER_NO_LIMIT; /* would say the same as the first */
+    }
+    int32_t limit = 0;
+    switch (place.family) {
+    case FAMILY_POWER: limit = limits->limit_W; break;
+    case FAMILY_LINE: limit = limits->limit_mA; break;
+    case FAMILY_DELTA: limit = limits->delta_mA; break;
+    case FAMILY_DIFFERENCE:
+    default: limit = limits->imbalance_mA; break;
+    }
+    return limit == 0 ? TAPER_NO_LIMIT : limit;
+}
+
+int32_t taper_row_limit_now(const taper_station_config_t *config, const taper_supply_t *supply, uint8_t group,
+                            taper_row_kind_t kind) {
+    const int32_t limit = taper_row_limit(config, group, kind);
+    const place_t place = place_of(kind);
+    if (limit == TAPER_NO_LIMIT || group != 0) {
+        return limit;
+    }
+    if (place.family == FAMILY_POWER) {
+        return taper_max_i32(taper_min_i32(limit, supply->site_W), 0);
+    }
+    if (place.family == FAMILY_LINE) {
+        return taper_max_i32(taper_min_i32(limit, supply->phase_mA[place.line]), 0);
+    }
+    return limit;
+}
+
+static bool has_phase(const taper_booking_t *booking, unsigned phase) {
+    return ((unsigned)booking->phases >> phase % 3u & 1u) != 0u;
+}
+
+/** The first phase of the pair that a line-to-line connector is between; 3: it is not between a pair. */
+static unsigned pair_of(const taper_booking_t *booking) {
+    static const uint8_t pairs[8] = {3, 3, 3, 0, 3, 2, 1, 3};
+    return booking->line_to_line ? pairs[booking->phases & 7u] : 3u;
+}
+
+static int32_t line_permille(const taper_booking_t *booking, unsigned line, bool second) {
+    if (!has_phase(booking, line)) {
+        return 0;
+    }
+    const unsigned pair = pair_of(booking);
+    if (pair == 3u) {
+        return FULL_permille;
+    }
+    return (pair == line) != second ? FULL_permille : FACET_permille;
+}
+
+static int32_t delta_permille(const taper_booking_t *booking, unsigned line, bool second) {
+    const unsigned pair = pair_of(booking);
+    if (pair < 3u) {
+        const unsigned facet = (line + (second ? 1u : 0u)) % 3u;
+        return pair == (line + 2u) % 3u ? 2 * FULL_permille : pair == facet ? FULL_permille : 0;
+    }
+    const bool windings = has_phase(booking, line) && has_phase(booking, line + 2u);
+    const bool one = has_phase(booking, line) || has_phase(booking, line + 2u);
+    return windings ? DELTA_MOST_permille : one ? FULL_permille : 0;
+}
+
+static int32_t difference_permille(const taper_booking_t *booking, unsigned line) {
+    return (has_phase(booking, line) ? FULL_permille : 0) -
+           (has_phase(booking, line + 1u) ? FULL_permille : 0);
+}
+
+int32_t taper_row_weight(const taper_booking_t *booking, taper_row_kind_t kind) {
+    const place_t place = place_of(kind);
+    int32_t permille = 0;
+    switch (place.family) {
+    case FAMILY_POWER: return booking->W_per_A;
+    case FAMILY_LINE: permille = line_permille(booking, place.line, place.second); break;
+    case FAMILY_DELTA: permille = delta_permille(booking, place.line, place.second); break;
+    case FAMILY_DIFFERENCE:
+    default: permille = difference_permille(booking, place.line); break;
+    }
+    return permille * booking->permille / FULL_permille;
+}
+
+uint8_t taper_rotation_phases(taper_rotation_t rotation, uint8_t conductors) {
+    /* Supply phase of conductors L1, L2, L3 by rotation; one that is not known counts as straight. */
+    static const uint8_t order[7][3] = {{0, 1, 2}, {0, 1, 2}, {1, 2, 0}, {2, 0, 1},
+                                        {0, 2, 1}, {1, 0, 2}, {2, 1, 0}};
+    unsigned mask = 0;
+    for (uint8_t k = 0; k < conductors && k < 3; k++) {
+        mask |= 1u << order[(unsigned)rotation < 7u ? rotation : 0][k];
+    }
+    return (uint8_t)mask;
+}
+
+static int32_t whole_V(int32_t voltage_mV) {
+    return (voltage_mV + 999) / 1000;
+}
+
+taper_booking_t taper_booking_nominal(const taper_station_config_t *config, uint8_t i) {
+    const taper_connector_config_t *connector = &config->connectors[i];
+    const int32_t volts_V = whole_V(connector->voltage_mV);
+    if (connector->is_dc) {
+        const int32_t W_per_A =
+            (volts_V * 1000 + connector->efficiency_permille - 1) / connector->efficiency_permille;
+        const int32_t supply_mV = 3 * config->site_voltage_mV;
+        return (taper_booking_t){.W_per_A = W_per_A,
+                                 .permille =
+                                     (int32_t)(((int64_t)W_per_A * 1000000 + supply_mV - 1) / supply_mV),
+                                 .phases = 7};
+    }
+    const uint8_t conductors = connector->line_to_line ? 2 : connector->phases;
+    return (taper_booking_t){.W_per_A = volts_V * connector->phases,
+                             .permille = FULL_permille,
+                             .phases =
+                                 taper_rotation_phases((taper_rotation_t)connector->rotation, conductors),
+                             .line_to_line = connector->line_to_line};
+}
+
+taper_booking_t taper_booking_now(const taper_station_config_t *config, const taper_snapshot_t *snapshot,
+                                  uint8_t i) {
+    const taper_demand_t *demand = &snapshot->demand[i];
+    taper_booking_t booking =
+        demand->booking.phases == 0 ? taper_booking_nominal(config, i) : demand->booking;
+    if (demand->booking.phases == 0 && demand->active) {
+        booking.W_per_A = demand->W_per_A;
+    }
+    booking.W_per_A = taper_max_i32(booking.W_per_A, demand->booking.W_per_A);
+    return booking;
+}
+
+bool taper_group_contains(const taper_station_config_t *config, uint8_t k, uint8_t i) {
+    uint8_t group = config->connectors[i].group;
+    for (uint8_t depth = 0; depth < config->group_count && group != TAPER_NO_GROUP; depth++) {
+        if (group == k) {
+            return true;
+        }
+        group = config->groups[group].parent;
+    }
+    return false;
+}
+
+bool taper_row_is_planned(const taper_station_config_t *config, uint8_t group, taper_row_kind_t kind) {
+    if (taper_row_limit(config, group, kind) == TAPER_NO_LIMIT) {
+        return false;
+    }
+    for (uint8_t i = 0; i < config->connector_count; i++) {
+        const taper_booking_t booking = taper_booking_nominal(config, i);
+        if (taper_group_contains(config, group, i) && taper_row_weight(&booking, kind) != 0) {
+            return true;
+        }
+    }
+    return false;
+}
