@@ -99,12 +99,8 @@ static uint8_t phases_booked(const taper_connector_config_t *connector, const ta
     return told == TAPER_ROTATION_UNKNOWN ? 7 : described | taper_rotation_phases(told, conductors);
 }
 
-static int32_t count_phases(uint8_t phases) {
-    return (phases & 1) + (phases >> 1 & 1) + (phases >> 2 & 1);
-}
-
-/* What 1 A of a connector counts with `conductors` in use. Where its wiring is in doubt, it counts on more phases than it
-   uses, in current and in power. */
+/* What 1 A of a connector counts with `conductors` in use. One that does not know its wiring counts as three phases, in
+   power too. */
 static taper_booking_t booking_of(const taper_session_table_t *table, uint8_t connector, uint32_t now_ms,
                                   uint8_t conductors) {
     const taper_connector_config_t *config = &table->config->connectors[connector];
@@ -119,8 +115,8 @@ static taper_booking_t booking_of(const taper_session_table_t *table, uint8_t co
     }
     const uint8_t wires = config->line_to_line ? 2 : conductors;
     booking.phases = phases_booked(config, session, wires);
-    const int32_t beside = count_phases(booking.phases) - wires; /* phases that it might use instead */
-    booking.W_per_A = volts_V * (conductors + beside);
+    const bool unknown = session->info_known && session->info.rotation == TAPER_ROTATION_UNKNOWN;
+    booking.W_per_A = volts_V * (unknown ? 3 : conductors);
     return booking;
 }
 
