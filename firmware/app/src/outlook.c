@@ -65,8 +65,7 @@ static void tell_prospect(const taper_station_t *station, uint8_t i, taper_outlo
 
 taper_outlook_t taper_station_outlook(const taper_station_t *station, uint8_t connector) {
     const taper_demand_t *demand = &station->snapshot.demand[connector];
-    const taper_waiting_t waiting =
-        taper_allocator_waiting(&station->allocator, station->options.config, &station->snapshot, connector);
+    const taper_waiting_t waiting = taper_allocator_waiting(&station->allocator, connector);
     taper_outlook_t outlook = {
         .reason = (uint8_t)taper_station_reason(station, connector),
         .waiting_place = waiting.place,

@@ -71,8 +71,7 @@ taper_reason_t taper_station_binding_limit(const taper_station_t *station, uint8
 
 /** It has its target, and nothing of its own keeps it from more. */
 static taper_reason_t reason_of_target(const taper_station_t *station, uint8_t i) {
-    const taper_waiting_t waiting =
-        taper_allocator_waiting(&station->allocator, station->options.config, &station->snapshot, i);
+    const taper_waiting_t waiting = taper_allocator_waiting(&station->allocator, i);
     const taper_reason_t limit = taper_station_binding_limit(station, i);
     if (limit == TAPER_REASON_GRID_PAUSE) {
         return limit;

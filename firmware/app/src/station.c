@@ -91,10 +91,11 @@ static void copy_counters(taper_station_t *station) {
 /** A step that comes late tells that the one before, or what ran beside it, took too long. */
 static void watch_ticks(taper_station_t *station, uint32_t now_ms) {
     const uint32_t tick_ms = station->options.config->tick_ms / station->options.time_scale;
-    const uint32_t took_ms = station->stepped ? taper_elapsed_ms(now_ms, station->stepped_ms) : 0;
-    if (taper_self_ticked(&station->self, took_ms, tick_ms)) {
+    const uint32_t passed_ms = station->stepped ? taper_elapsed_ms(now_ms, station->stepped_ms) : 0;
+    const uint32_t late_ms = passed_ms > tick_ms ? passed_ms - tick_ms : 0;
+    if (taper_self_ticked(&station->self, late_ms, tick_ms)) {
         taper_station_count(station, TAPER_COUNTER_TICK_OVERRUNS);
-        taper_event_note(&station->events, TAPER_EVENT_TICK_OVERRUN, 0, 0, taper_saturate_i32(took_ms));
+        taper_event_note(&station->events, TAPER_EVENT_TICK_OVERRUN, 0, 0, taper_saturate_i32(late_ms));
     }
     station->stepped = true;
     station->stepped_ms = now_ms;
@@ -153,7 +154,8 @@ void taper_station_stop(taper_station_t *station, uint32_t now_ms) {
 }
 
 taper_status_t taper_station_set_limit_curve(taper_station_t *station, const taper_limit_curve_t *curve) {
-    return curve == NULL ? TAPER_ERR_ARGUMENT : taper_limits_set_curve(&station->limits, TAPER_CURVE_OF_FILE, curve);
+    return curve == NULL ? TAPER_ERR_ARGUMENT
+                         : taper_limits_set_curve(&station->limits, TAPER_CURVE_OF_FILE, curve);
 }
 
 taper_status_t taper_station_set_price_curve(taper_station_t *station, const taper_price_curve_t *curve) {
