@@ -82,6 +82,61 @@ fallback_A = 1.0
 reaction_s = 0.5
 """
 
+# The ends of the ranges, all at once.
+EDGES = """\
+name = "x"
+description = "The ends of all ranges"
+[horizon]
+steps = 255
+step_s = 3600
+[control]
+tick_ms = 60000
+min_on_s = 86400
+min_off_s = 86400
+turn_s = 86400
+change_s = 600
+ramp_A_per_s = 409.4
+deadband_A = 409.4
+[planning]
+price_weight = 1
+[site]
+failsafe_kW = 3276.7
+other_load_kW = 3276.7
+other_load_A = 10000
+voltage_V = 1500
+[[groups]]
+name = "site"
+limit_kW = 3276.7
+limit_A = 10000
+imbalance_A = 10000
+[[groups]]
+name = "feeder"
+parent = "site"
+limit_A = 10000
+delta_side_A = 833.333
+delta_side_V = 36000
+[[connectors]]
+count = 239
+group = "feeder"
+kind = "AC"
+phases = 3
+rotation = "L3-L2-L1"
+voltage_V = 1500
+min_A = 409.4
+max_A = 409.4
+fallback_A = 409.4
+reaction_s = 60
+[[connectors]]
+count = 1
+group = "site"
+kind = "DC"
+voltage_V = 1500
+min_A = 0
+max_A = 0.1
+efficiency = 0.004
+reaction_s = 0
+"""
+
 # (what to replace in WIRED, by what, key, reason)
 MISTAKES = {
     "turn below the least time on": ("turn_s = 600", "turn_s = 299", "control.turn_s", "below min_on_s (299 < 300)"),
