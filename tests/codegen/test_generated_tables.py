@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 from conftest import CODEGEN, ROOT, STATIONS, Run, compile_c
+from station_texts import EDGES, WIRED, twelve_groups
 from test_station_files import GOOD
-from test_station_wiring import EDGES, WIRED, twelve_groups
 
 DUMP = Path(__file__).with_name("dump_stations.c")
 STRICT = ("-Wpedantic", "-Wconversion", "-Wshadow")
