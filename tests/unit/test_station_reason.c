@@ -55,7 +55,7 @@ static void test_a_feeder_that_leaves_no_more_is_told_to_those_on_it(void) {
 }
 
 static void test_without_room_for_its_minimum_a_vehicle_waits(void) {
-    tick(2, 8500);
+    tick(2, 8200);
     assert_reason(TAPER_REASON_VEHICLE_LIMIT, 1);
     assert_reason(TAPER_REASON_WAITING, 2);
 }
@@ -123,7 +123,7 @@ static void test_plan_tells_the_reason_on_the_bus_and_every_connector_has_its_tu
     bool bad_field = false;
     bench.deaf = true;
     for (int k = 0; k < 8; k++) {
-        tick(2, 8500);
+        tick(2, 8200);
     }
     while (taper_membus_world_receive(&bench.bus, &frame)) {
         if (frame.id >> 6 == TAPER_MESSAGE_OUTLOOK && taper_decode(&frame, &message, &bad_field)) {

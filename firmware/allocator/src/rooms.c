@@ -32,31 +32,28 @@ taper_weights_t taper_rooms_weigh(const taper_rooms_t *rooms, const taper_bookin
     return weights;
 }
 
-/** How much of `wanted_mA` fits into one room; a room that is not there (INT64_MAX) is never too small. */
-static int32_t fit_one_mA(int64_t room, int32_t weight, int32_t wanted_mA) {
-    if (weight == 0 || room >= (int64_t)weight * wanted_mA) {
-        return wanted_mA;
-    }
-    return room < 0 ? -1 : (int32_t)(room / weight);
-}
-
 int32_t taper_rooms_fit_mA(const taper_rooms_t *rooms, const taper_station_config_t *config, uint8_t i,
                            const taper_weights_t *weights, int32_t wanted_mA) {
-    int32_t least_mA = wanted_mA;
+    int64_t least_mA = wanted_mA;
     for (uint8_t k = config->connectors[i].group; k != TAPER_NO_GROUP; k = config->groups[k].parent) {
-        for (uint8_t column = 0; column < rooms->columns && least_mA >= 0; column++) {
-            least_mA = fit_one_mA(rooms->room[k][column], weights->of[column], least_mA);
+        const int64_t *room = rooms->room[k];
+        for (unsigned column = 0; column < rooms->columns; column++) {
+            const int64_t weight = weights->of[column];
+            if (weight * least_mA > room[column] && weight > 0) { /* never so where there is no row */
+                least_mA = room[column] < 0 ? -1 : room[column] / weight;
+            }
         }
     }
-    return least_mA;
+    return (int32_t)least_mA;
 }
 
 void taper_rooms_draw(taper_rooms_t *rooms, const taper_station_config_t *config, uint8_t i,
                       const taper_weights_t *weights, int32_t current_mA) {
     for (uint8_t k = config->connectors[i].group; k != TAPER_NO_GROUP; k = config->groups[k].parent) {
-        for (uint8_t column = 0; column < rooms->columns; column++) {
-            if (rooms->room[k][column] != INT64_MAX) {
-                rooms->room[k][column] -= (int64_t)weights->of[column] * current_mA;
+        int64_t *room = rooms->room[k];
+        for (unsigned column = 0; column < rooms->columns; column++) {
+            if (room[column] != INT64_MAX) {
+                room[column] -= (int64_t)weights->of[column] * current_mA;
             }
         }
     }
