@@ -260,6 +260,8 @@ static void test_a_delta_side_carries_differences_of_pairs(void) {
     for (unsigned line = 0; line < 3; line++) {
         give_pairs(line, 10000, 0, 0);
         assert_just_enough(&tree.group[0].delta_mA, 20000); /* 1 : 2 : 1 */
+        tree.group[0].delta_mA = 9999;
+        TEST_ASSERT_FALSE(tree_guard(&tree));
         give_pairs(line, 10000, 10000, 10000);
         assert_just_enough(&tree.group[0].delta_mA, 30000);
         give_pairs(line, 20000, 10000, 0);
@@ -325,6 +327,23 @@ static void test_a_pair_counts_for_imbalance_on_both_of_its_lines(void) {
     }
 }
 
+static void test_no_limit_lets_100_kA_pass(void) {
+    give_pairs(0, 32000, 0, 0);
+    tree.group[0].limit_mA = INT32_MAX;
+    tree.snapshot.demand[0].booking.permille = 3124000; /* 99.968 kA */
+    TEST_ASSERT_TRUE(tree_guard(&tree));
+    tree.snapshot.demand[0].booking.permille = 3125000;
+    TEST_ASSERT_FALSE(tree_guard(&tree));
+    tree.snapshot.demand[0].booking.permille = INT32_MAX;
+    TEST_ASSERT_FALSE(tree_guard(&tree));
+    tree.group[0].limit_mA = 100000000;
+    tree.snapshot.demand[0].booking.permille = 3124000;
+    TEST_ASSERT_TRUE(tree_guard(&tree));
+    tree.group[0].limit_mA = 0;
+    tree.group[0].delta_mA = INT32_MAX;
+    TEST_ASSERT_FALSE(tree_guard(&tree)); /* twice that */
+}
+
 static void test_limits_beyond_all_currents_pass(void) {
     give_pairs(0, 32000, 32000, 32000);
     tree.group[0].limit_mA = INT32_MAX;
@@ -353,6 +372,7 @@ int main(void) {
     RUN_TEST(test_what_flows_to_neutral_is_in_two_lines_of_a_delta_side);
     RUN_TEST(test_phases_differ_by_no_more_than_the_imbalance);
     RUN_TEST(test_a_pair_counts_for_imbalance_on_both_of_its_lines);
+    RUN_TEST(test_no_limit_lets_100_kA_pass);
     RUN_TEST(test_limits_beyond_all_currents_pass);
     return UNITY_END();
 }
