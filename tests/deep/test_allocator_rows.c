@@ -226,7 +226,7 @@ static void test_rooms_say_what_is_left_and_what_is_overdrawn(void) {
     tree_add(&tree, leaf, L1);
     tree.group[1].limit_mA = 20000;
     taper_rooms_open(&rooms, &tree.config, &tree.supply);
-    TEST_ASSERT_EQUAL_UINT8(4, rooms.columns); /* power, and three phases */
+    TEST_ASSERT_EQUAL_UINT8(4, rooms.kinds); /* power, and three phases */
     const taper_booking_t booking = taper_booking_now(&tree.config, &tree.snapshot, 0);
     TEST_ASSERT_EQUAL_INT32(20000, taper_rooms_left_mA(&rooms, &tree.config, 0, &booking));
     taper_rooms_take(&rooms, &tree.config, 0, &booking, 20000);
@@ -236,6 +236,16 @@ static void test_rooms_say_what_is_left_and_what_is_overdrawn(void) {
     taper_rooms_take(&rooms, &tree.config, 0, &booking, 1);
     TEST_ASSERT_EQUAL_INT32(-1, taper_rooms_left_mA(&rooms, &tree.config, 0, &booking));
     TEST_ASSERT_EQUAL_INT32(-1, taper_rooms_fit_mA(&rooms, &tree.config, 0, &weights, 0));
+}
+
+static void test_the_least_weight_counts(void) {
+    taper_rooms_t rooms;
+    tree_add(&tree, leaf, L1);
+    tree.snapshot.demand[0].booking.permille = 1;
+    tree.group[leaf].limit_mA = 9;
+    taper_rooms_open(&rooms, &tree.config, &tree.supply);
+    const taper_booking_t booking = taper_booking_now(&tree.config, &tree.snapshot, 0);
+    TEST_ASSERT_EQUAL_INT32(9000, taper_rooms_left_mA(&rooms, &tree.config, 0, &booking));
 }
 
 static void test_rooms_without_any_limit_have_all_that_an_integer_holds(void) {
@@ -262,6 +272,7 @@ int main(void) {
     RUN_TEST(test_the_last_step_rounds_a_ceiling_up_where_there_is_room);
     RUN_TEST(test_a_rank_that_names_nobody_raises_nobody);
     RUN_TEST(test_rooms_say_what_is_left_and_what_is_overdrawn);
+    RUN_TEST(test_the_least_weight_counts);
     RUN_TEST(test_rooms_without_any_limit_have_all_that_an_integer_holds);
     return UNITY_END();
 }
