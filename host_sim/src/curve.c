@@ -23,7 +23,7 @@
 #define FROM_GATEWAY ((uint16_t)((unsigned)TAPER_MESSAGE_ISOTP_FROM << 6 | TAPER_NODE_GATEWAY))
 #define CTRL_STATUS  ((uint16_t)((unsigned)TAPER_MESSAGE_CTRL_STATUS << 6 | TAPER_NODE_CONTROLLER))
 
-void sim_curve_init(sim_curve_t *curve, const sim_limits_t *limits) {
+void sim_curve_init(sim_curve_t *curve, const sim_course_t *limits) {
     *curve = (sim_curve_t){.limits = limits, .due_s = INT64_MIN};
     const taper_isotp_options_t options = {
         .send_id = FROM_GATEWAY,
@@ -51,8 +51,8 @@ static uint32_t get(const uint8_t *from, unsigned bytes) {
 }
 
 /** The wire knows whole seconds: the least limit in the one that begins at `second`, rounded down [100 W]. */
-static uint32_t wire_limit(const sim_limits_t *limits, int64_t second) {
-    const double kw = sim_limits_least_kw(limits, (double)second, (double)second + 1.0);
+static uint32_t wire_limit(const sim_course_t *limits, int64_t second) {
+    const double kw = sim_course_least(limits, (double)second, (double)second + 1.0);
     return (uint32_t)fmin(floor(kw / WIRE_STEP_KW + 1e-6), WIRE_MOST); // the hair: see watts() in gateway.c
 }
 
@@ -84,11 +84,11 @@ static void add(writer_t *writer, int64_t second) {
 
 /** Write the course from `now_s` on, as far as it fits. @return the message's length. */
 static uint16_t write_message(sim_curve_t *curve, int64_t now_s) {
-    const sim_limits_t *limits = curve->limits;
+    const sim_course_t *limits = curve->limits;
     const double end_s = (double)(now_s + CURVE_AHEAD_S);
     writer_t writer = {.curve = curve};
     add(&writer, now_s);
-    for (size_t i = sim_limits_point(limits, (double)now_s);
+    for (size_t i = sim_course_point(limits, (double)now_s);
          i < limits->count && limits->time_s[i] < end_s && writer.count < TAPER_MAX_LIMIT_POINTS; i++) {
         if (limits->time_s[i] > (double)now_s) {
             add(&writer, (int64_t)floor(limits->time_s[i]));

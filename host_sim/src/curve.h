@@ -24,7 +24,7 @@ typedef enum {
 } sim_curve_state_t;
 
 typedef struct {
-    const sim_limits_t *limits; /**< NULL: there is no limit to tell */
+    const sim_course_t *limits; /**< NULL: there is no limit to tell */
     sim_curve_state_t state;
     uint32_t waiting_since_ms;
     int64_t due_s;      /**< when it goes out again at the latest */
@@ -40,7 +40,7 @@ typedef struct {
 } sim_curve_t;
 
 /** Nothing sent yet. `limits` must outlive the curve; a constant limit is never sent, SITE_LIMIT says it all. */
-void sim_curve_init(sim_curve_t *curve, const sim_limits_t *limits);
+void sim_curve_init(sim_curve_t *curve, const sim_course_t *limits);
 
 /** Take in a frame. @return whether it was one of the transfer; others are left alone. */
 bool sim_curve_take(sim_curve_t *curve, const taper_frame_t *frame, uint32_t now_ms);

@@ -125,22 +125,23 @@ static void draw(sim_field_t *field, unsigned i) {
     evse->power_kw = 0.0;
     evse->current_A = 0.0;
     if (sim_evse_wants(evse)) {
-        sim_evse_draw(evse, node->followed_mA, (double)INFINITY);
+        sim_evse_draw(evse, node->followed_mA, sim_evse_takes_kw(evse));
     }
 }
 
-/** Most that a connector lets its vehicle draw, whatever that wants [kW]. */
-static double may_kw(const sim_evse_t *evse) {
-    const int32_t offered_mA = evse->vehicle == NULL ? 0 : sim_evse_offered_mA(evse, evse->setpoint_mA);
-    return (double)offered_mA / 1000.0 * sim_evse_kw_per_A(evse);
+/** Most that a connector lets its vehicle draw, whatever that wants [A]. */
+static double may_A(const sim_evse_t *evse) {
+    return evse->vehicle == NULL ? 0.0 : (double)sim_evse_offered_mA(evse, evse->setpoint_mA) / 1000.0;
 }
 
 static void look(sim_field_t *field) {
-    double drawn[TAPER_MAX_CONNECTORS];
-    double may[TAPER_MAX_CONNECTORS];
-    for (unsigned i = 0; i < field->options.station->connector_count; i++) {
-        drawn[i] = field->evse[i].power_kw;
-        may[i] = may_kw(&field->evse[i]);
+    const taper_station_config_t *station = field->options.station;
+    sim_load_t drawn[TAPER_MAX_CONNECTORS];
+    sim_load_t may[TAPER_MAX_CONNECTORS];
+    for (unsigned i = 0; i < station->connector_count; i++) {
+        const sim_evse_t *evse = &field->evse[i];
+        drawn[i] = sim_load_of(station, i, sim_evse_conductors(evse), evse->current_A);
+        may[i] = sim_load_of(station, i, sim_evse_conductors(evse), may_A(evse));
     }
     sim_tracker_look(&field->tracker, (uint64_t)field->now_ms, sim_field_limit_kw(field), drawn, may);
 }
