@@ -219,7 +219,7 @@ void taper_station_stop(taper_station_t *station, uint32_t now_ms) {
 }
 
 taper_status_t taper_station_set_limit_curve(taper_station_t *station, const taper_limit_curve_t *curve) {
-    return curve == NULL ? TAPER_ERR_ARGUMENT : taper_limits_set_curve(&station->limits, curve);
+    return curve == NULL ? TAPER_ERR_ARGUMENT : taper_limits_set_curve(&station->limits, TAPER_CURVE_OF_FILE, curve);
 }
 
 const taper_event_log_t *taper_station_events(const taper_station_t *station) {

@@ -9,9 +9,8 @@
 
 /** The station's end; everything that is a peer's is in its link. */
 extern taper_transfers_t transfers;
-extern taper_transfer_scene_t scene; /**< now_ms is the time of the bench */
-extern taper_limit_curve_t curve;    /**< of the last result CURVE */
-extern uint8_t connector;            /**< of the last result IDENTIFIER */
+extern taper_transfer_scene_t scene;     /**< now_ms is the time of the bench */
+extern taper_transfer_content_t content; /**< of the last result CURVE, PRICE or IDENTIFIER */
 
 /** A peer and what it got. */
 typedef struct {

@@ -128,7 +128,7 @@ typedef struct {
     taper_allocator_t allocator;
     taper_ledger_t ledger;
     taper_transfers_t transfers;
-    taper_limit_curve_t incoming_curve; /**< being taken over from a transfer */
+    taper_transfer_content_t incoming; /**< being taken over from a transfer */
     taper_trouble_t refused_transfers;
     taper_event_log_t events;
     taper_e2e_receiver_t connector_e2e[TAPER_MAX_CONNECTORS][TAPER_CONNECTOR_RECEIVERS];
@@ -197,8 +197,9 @@ void taper_station_poll(taper_station_t *station, uint32_t now_ms);
 void taper_station_stop(taper_station_t *station, uint32_t now_ms);
 
 /**
- * Replace the known course of the site limit. Times are on the world's clock (`now_ms` times the time scale), within 24
- * days; the curve is copied. It can only lower the site limit that the configuration and the gateway give.
+ * Replace the site's own known course of its limit, beside that of the gateway; the least counts. Times are on the world's
+ * clock (`now_ms` times the time scale), within 24 days; the curve is copied. It can only lower the site limit that the
+ * configuration and the gateway give.
  * @return TAPER_ERR_ARGUMENT for too many points, times not ascending, or a negative limit; the old curve stays then.
  */
 taper_status_t taper_station_set_limit_curve(taper_station_t *station, const taper_limit_curve_t *curve);
