@@ -33,6 +33,7 @@ typedef struct {
     taper_port_t port;
     sim_sessions_t sessions;
     sim_course_t limits; /**< count 0: none */
+    sim_course_t prices; /**< likewise */
     sim_results_t results;
     sim_field_t field;
     int64_t recorded_s; /**< last step that was recorded */
@@ -69,6 +70,7 @@ static bool load(ev_t *ev) {
                               ? taper_stations[options->station]->connector_count
                               : TAPER_MAX_CONNECTORS;
     return sim_sessions_load(&ev->sessions, options->sessions_file, most) &&
+           (options->price_file == NULL || sim_prices_load(&ev->prices, options->price_file)) &&
            (options->out == NULL || sim_output_check(options->out));
 }
 
@@ -126,6 +128,7 @@ static void start_field(ev_t *ev, bool *closed) {
                                        .sessions = &ev->sessions,
                                        .outcome = ev->results.outcome,
                                        .limits = has_limit(options) ? &ev->limits : NULL,
+                                       .prices = options->price_file != NULL ? &ev->prices : NULL,
                                        .closed = closed,
                                        .world_start_s = first_arrival_s(&ev->sessions),
                                        .time_scale = options->time_scale,
@@ -278,6 +281,7 @@ int main(int argc, char **argv) {
     }
     sim_sessions_free(&ev->sessions);
     sim_course_free(&ev->limits);
+    sim_course_free(&ev->prices);
     free(ev);
     return fflush(stdout) == 0 ? code : SIM_EXIT_INPUT;
 }

@@ -9,6 +9,11 @@
 /** Frames taken in one poll. A babbling bus cannot hold it up. */
 #define MOST_FRAMES 4096
 
+static void start_curve(sim_field_t *field) {
+    sim_curve_init(&field->curve, field->options.limits);
+    sim_curve_set_prices(&field->curve, field->options.prices);
+}
+
 void sim_field_init(sim_field_t *field, const sim_field_options_t *options, uint32_t now_ms) {
     *field = (sim_field_t){.options = *options, .last_ms = now_ms, .queue_s = INT64_MIN};
     sim_field_options_t *own = &field->options;
@@ -21,7 +26,7 @@ void sim_field_init(sim_field_t *field, const sim_field_options_t *options, uint
     }
     sim_queue_init(&field->queue, own->sessions, field->evse, station->connector_count, own->outcome);
     sim_gateway_init(&field->gateway, own->limits, own->port, 0, own->seed);
-    sim_curve_init(&field->curve, own->limits);
+    start_curve(field);
     sim_field_start_gateway(field);
     sim_tracker_init(&field->tracker, station, own->grace_ms == 0 ? SIM_GRACE_ms : own->grace_ms);
 }
@@ -173,7 +178,7 @@ void sim_field_power_off(sim_field_t *field, unsigned node) {
     if (node == SIM_GATEWAY) {
         field->gateway.counter[0] = 0;
         field->gateway.counter[1] = 0;
-        sim_curve_init(&field->curve, field->options.limits);
+        start_curve(field);
         sim_field_start_gateway(field);
     } else {
         sim_evse_restart(&field->evse[node]);

@@ -6,8 +6,8 @@
 #include <math.h>
 #include <stdio.h>
 
-/** What is beyond this was given in a wrong unit. */
-#define MOST_PER_KWH 1000.0
+/** The bus carries 16 bits of thousandths, less the one that means absent. */
+#define MOST_PER_KWH 32.767
 
 bool sim_limits_cap(sim_course_t *limits, double most_kw) {
     bool any = false;

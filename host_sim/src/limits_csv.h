@@ -14,7 +14,8 @@
 bool sim_limits_choose(sim_course_t *limits, const char *file, double limit_kw, double station_kw);
 
 /**
- * The price of energy over time, of `file`: `time_s,price_per_kwh`, -1000..1000 in any currency.
+ * The price of energy over time, of `file`: `time_s,price_per_kwh`, in a currency in which none is beyond 32.767,
+ * what the bus carries.
  * @return false, after one line on stderr. Else free with sim_course_free().
  */
 bool sim_prices_load(sim_course_t *prices, const char *file);

@@ -27,7 +27,7 @@ static const char description[] =
     "LIMIT CSV: time_s [s], ascending, and limit_kw [kW]; each limit holds until the next one, the first one "
     "before its time too. The station's own limit holds besides.\n"
     "\n"
-    "PRICE CSV: time_s [s], ascending, and price_per_kwh in any currency, -1000..1000; each price holds "
+    "PRICE CSV: time_s [s], ascending, and price_per_kwh in any currency, -32.767..32.767; each price holds "
     "until "
     "the next one, the first one before its time too.\n"
     "\n"

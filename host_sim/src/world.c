@@ -249,6 +249,7 @@ bool sim_world_run(const sim_case_t *run, sim_results_t *results) {
     sim_fleet_init(&world->fleet, run->station, &world->world_port, run->policy->tells_taper, run->seed);
     sim_gateway_init(&world->gateway, run->limits, &world->world_port, world->tick_s, run->seed);
     sim_curve_init(&world->curve, run->limits);
+    sim_curve_set_prices(&world->curve, run->prices);
     sim_queue_init(&world->queue, run->sessions, world->fleet.evse, run->station->connector_count,
                    results->outcome);
     world->account = (sim_account_t){.fleet = &world->fleet, .prices = run->prices, .results = results};
