@@ -40,9 +40,15 @@ def _reason_in(group: Group, connector: Connector, share: int) -> str | None:
     if 0 < group.limit_mA < least_mA:
         return f"need {least_mA / 1000:.10g} A of a phase, above limit_A"
     one_phase = connector.kind == "AC" and connector.phases == 1
-    # As rows.c weighs one connector: from phase to neutral one winding, else one line carries two of them.
-    if 0 < group.delta_mA < least_mA * (1 if one_phase and not connector.line_to_line else 2):
+    if 0 < group.delta_mA < -(-least_mA * _delta_permille(connector) // 1000):
         return "are too much for delta_side_A"
     if one_phase and 0 < group.imbalance_mA < least_mA:
         return "on one phase are above imbalance_A"
     return None
+
+
+def _delta_permille(connector: Connector) -> int:
+    """What rows.c counts for 1 A on the line of the delta side that it loads most."""
+    if connector.line_to_line:
+        return 2000  # in the line that both its windings share
+    return 1000 if connector.kind == "AC" and connector.phases == 1 else 1733  # sqrt(3), rounded up

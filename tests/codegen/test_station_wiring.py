@@ -246,10 +246,16 @@ MISTAKES = {
         "connectors[1].min_A",
         '6 A need 6 A of a phase, above limit_A of "site"',
     ),
-    "least current of more than a delta side has": (
+    "least current of three phases of more than a delta side has": (
+        "delta_side_A = 180.5",
+        "delta_side_A = 2.599",  # 10.396 A on the wye side, below sqrt(3) times 6 A
+        "connectors[1].min_A",
+        '6 A are too much for delta_side_A of "feeder"',
+    ),
+    "least current of a pair of more than a delta side has": (
         "delta_side_A = 180.5",
         "delta_side_A = 2.9",
-        "connectors[1].min_A",
+        "connectors[3].min_A",
         '6 A are too much for delta_side_A of "feeder"',
     ),
     "least current of one phase above the imbalance": (
@@ -346,8 +352,9 @@ def test_a_turn_is_a_quarter_of_an_hour_or_the_least_time_on_if_that_is_longer(t
 
 
 def test_a_limit_that_just_has_room_for_the_least_current_is_enough(tmp_path: Path) -> None:
-    just = ("limit_A = 200.0", "limit_A = 7\nlimit_kW = 2.16"), ("imbalance_A = 20.0", "imbalance_A = 6")
-    assert changed(tmp_path, *just, ("delta_side_A = 180.5", "delta_side_A = 3")).groups[1].limit_mA == 7_000
+    limits = ("limit_A = 200.0", "limit_A = 7\nlimit_kW = 2.16"), ("imbalance_A = 20.0", "imbalance_A = 6")
+    pair = ("delta_side_A = 180.5", "delta_side_A = 3")  # 12 A on the wye side: 6 A in each of two windings
+    assert changed(tmp_path, *limits, pair).groups[1].limit_mA == 7_000
 
 
 def test_a_child_may_have_a_higher_limit_than_its_parent(tmp_path: Path) -> None:

@@ -1,18 +1,18 @@
 /* The check of a description at boot: from a good one, every single contradiction is refused, and every edge passes. */
 #include "taper/config_check.h"
 
-#include <string.h>
-
+#include "taper/stations.h"
 #include "unity.h"
 
 enum { THREE, PAIR, DIRECT, ONE, CONNECTORS };
 enum { SITE, FEEDER, POD, GROUPS };
 
 static taper_station_config_t config;
-static taper_group_config_t groups[GROUPS];
-static taper_connector_config_t connectors[CONNECTORS];
+/* More than this image has room for, each sound by itself. */
+static taper_group_config_t groups[TAPER_MAX_GROUPS + GROUPS];
+static taper_connector_config_t connectors[TAPER_MAX_CONNECTORS + CONNECTORS];
 
-static taper_connector_config_t socket_at(uint8_t node) {
+static taper_connector_config_t socket(unsigned index) {
     return (taper_connector_config_t){.min_mA = 6000,
                                       .max_mA = 32000,
                                       .fallback_mA = 6000,
@@ -22,14 +22,14 @@ static taper_connector_config_t socket_at(uint8_t node) {
                                       .phases = 1,
                                       .rotation = TAPER_ROTATION_231,
                                       .group = POD,
-                                      .bus = 0,
-                                      .node = node};
+                                      .bus = (uint8_t)(index / TAPER_NODES_PER_BUS),
+                                      .node = (uint8_t)(index % TAPER_NODES_PER_BUS + 1)};
 }
 
 /** Every kind of connector, below every kind of limit. */
 static void make_good(void) {
-    for (uint8_t i = 0; i < CONNECTORS; i++) {
-        connectors[i] = socket_at((uint8_t)(i + 1));
+    for (unsigned i = 0; i < sizeof connectors / sizeof connectors[0]; i++) {
+        connectors[i] = socket(i);
     }
     connectors[THREE].phases = 3;
     connectors[THREE].rotation = TAPER_ROTATION_321;
@@ -42,7 +42,9 @@ static void make_good(void) {
     groups[SITE] = (taper_group_config_t){.limit_W = 150000, .limit_mA = 400000, .parent = TAPER_NO_GROUP};
     groups[FEEDER] = (taper_group_config_t){
         .limit_W = 100000, .limit_mA = 250000, .delta_mA = 700000, .imbalance_mA = 20000, .parent = SITE};
-    groups[POD] = (taper_group_config_t){.limit_mA = 80000, .parent = FEEDER};
+    for (unsigned k = POD; k < sizeof groups / sizeof groups[0]; k++) {
+        groups[k] = (taper_group_config_t){.limit_mA = 80000, .parent = FEEDER};
+    }
     config = (taper_station_config_t){.name = "good",
                                       .connectors = connectors,
                                       .groups = groups,
@@ -84,8 +86,14 @@ static void test_a_good_description_passes(void) {
     TEST_ASSERT_EQUAL(TAPER_OK, taper_config_check(&config));
 }
 
+static void test_every_station_of_this_image_passes(void) {
+    for (unsigned k = 0; k < taper_station_count; k++) {
+        TEST_ASSERT_EQUAL_MESSAGE(TAPER_OK, taper_config_check(taper_stations[k]), taper_stations[k]->name);
+    }
+}
+
 static void test_one_that_is_larger_than_the_image_is_refused(void) {
-    REFUSED(config.connector_count = 0);
+    REFUSED(config.connector_count = 0; config.line_to_line = false);
     REFUSED(config.connector_count = TAPER_MAX_CONNECTORS + 1);
     REFUSED(config.group_count = 0);
     REFUSED(config.group_count = TAPER_MAX_GROUPS + 1);
@@ -103,6 +111,7 @@ static void test_times_out_of_range_are_refused(void) {
     REFUSED(config.min_off_ms = 86400001);
     REFUSED(config.turn_ms = 86400001);
     REFUSED(config.change_ms = 600001);
+    ACCEPTED(config.tick_ms = 1);
     ACCEPTED(config.step_s = 60);
     ACCEPTED(config.step_s = 3600);
     ACCEPTED(config.tick_ms = 3600000);
@@ -139,7 +148,7 @@ static void test_what_is_no_tree_is_refused(void) {
 }
 
 static void test_a_group_without_a_limit_is_refused(void) {
-    REFUSED(groups[SITE].limit_W = 0); /* which has one in mA */
+    REFUSED(groups[SITE].limit_W = 0; config.failsafe_W = 0); /* which has one in mA */
     REFUSED(groups[POD].limit_mA = 0);
     REFUSED(groups[FEEDER].limit_W = groups[FEEDER].limit_mA =
                 0); /* a delta side or a difference bounds no sum */
@@ -158,6 +167,7 @@ static void test_limits_out_of_range_are_refused(void) {
     REFUSED(groups[FEEDER].imbalance_mA = -1);
     REFUSED(groups[FEEDER].imbalance_mA = 20000001);
     ACCEPTED(groups[FEEDER].limit_W = 3276700);
+    ACCEPTED(groups[FEEDER].limit_mA = 20000000);
     ACCEPTED(groups[FEEDER].delta_mA = groups[FEEDER].imbalance_mA = 0);
 }
 
@@ -169,6 +179,8 @@ static void test_a_site_that_contradicts_itself_is_refused(void) {
     REFUSED(config.site_voltage_mV = 2000001);
     ACCEPTED(config.failsafe_W = groups[SITE].limit_W);
     ACCEPTED(config.failsafe_W = 0);
+    ACCEPTED(config.site_voltage_mV = 50000);
+    ACCEPTED(config.site_voltage_mV = 2000000);
 }
 
 static void test_other_load_whose_part_of_a_limit_is_not_known_is_refused(void) {
@@ -192,7 +204,7 @@ static void test_currents_that_cannot_be_offered_are_refused(void) {
     REFUSED(connectors[THREE].max_mA = 32050);
     REFUSED(connectors[DIRECT].max_mA = connectors[DIRECT].min_mA = connectors[DIRECT].fallback_mA = 0);
     ACCEPTED(connectors[THREE].min_mA = 0);
-    ACCEPTED(connectors[THREE].min_mA = 6000);
+    ACCEPTED(connectors[THREE].min_mA = connectors[THREE].fallback_mA = 6100);
     ACCEPTED(connectors[DIRECT].min_mA = 5900);
     ACCEPTED(connectors[THREE].max_mA = 409400);
     ACCEPTED(connectors[THREE].max_mA = 6000);
@@ -220,6 +232,7 @@ static void test_wiring_that_cannot_be_is_refused(void) {
     REFUSED(connectors[THREE].voltage_mV = 0);
     REFUSED(connectors[THREE].voltage_mV = 2000001);
     ACCEPTED(connectors[THREE].rotation = TAPER_ROTATION_123);
+    ACCEPTED(connectors[THREE].voltage_mV = 2000000);
 }
 
 static void test_line_to_line_is_said_of_the_station_too(void) {
@@ -236,7 +249,9 @@ static void test_an_efficiency_that_cannot_be_is_refused(void) {
     REFUSED(connectors[THREE].efficiency_permille = 999);
     REFUSED(connectors[THREE].efficiency_permille = 0);
     ACCEPTED(connectors[DIRECT].efficiency_permille = 1000);
-    ACCEPTED(connectors[DIRECT].efficiency_permille = 12); /* 92.6 A */
+    /* 36 kW, which 120 V have in 100 A on each phase; and a watt more */
+    ACCEPTED(connectors[DIRECT].voltage_mV = 36000; connectors[DIRECT].efficiency_permille = 1);
+    REFUSED(connectors[DIRECT].voltage_mV = 36001; connectors[DIRECT].efficiency_permille = 1);
 }
 
 static void test_a_reaction_that_takes_longer_than_a_minute_is_refused(void) {
@@ -262,6 +277,7 @@ static void test_limits_lowered_below_the_least_current_pass(void) {
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_a_good_description_passes);
+    RUN_TEST(test_every_station_of_this_image_passes);
     RUN_TEST(test_one_that_is_larger_than_the_image_is_refused);
     RUN_TEST(test_times_out_of_range_are_refused);
     RUN_TEST(test_a_turn_shorter_than_the_least_time_on_is_refused);

@@ -70,6 +70,13 @@ static void test_a_heartbeat_without_a_limit_does_not_keep_the_old_one_alive(voi
     TEST_ASSERT_FALSE(taper_limits_gateway_alive(&limits, 6000));
 }
 
+static void test_a_limit_of_zero_leaves_nothing_at_once(void) {
+    gateway_says(20000, 0);
+    gateway_says(0, 1000);
+    assert_now(0, TAPER_LIMIT_GATEWAY, 1000);
+    TEST_ASSERT_EQUAL_UINT32(0, limits.negative);
+}
+
 static void test_a_negative_limit_counts_as_zero_and_is_counted(void) {
     gateway_says(-100, 0);
     assert_now(0, TAPER_LIMIT_GATEWAY, 0);
@@ -186,6 +193,7 @@ int main(void) {
     RUN_TEST(test_a_shorter_validity_ends_earlier);
     RUN_TEST(test_the_timeout_survives_the_wrap_of_the_clock);
     RUN_TEST(test_a_heartbeat_without_a_limit_does_not_keep_the_old_one_alive);
+    RUN_TEST(test_a_limit_of_zero_leaves_nothing_at_once);
     RUN_TEST(test_a_negative_limit_counts_as_zero_and_is_counted);
     RUN_TEST(test_the_gateway_can_set_the_failsafe_limit_within_what_was_built);
     RUN_TEST(test_the_curve_steps_at_its_points);

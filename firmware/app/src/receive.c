@@ -230,6 +230,7 @@ static void take_report(taper_station_t *station, taper_frame_t *frame) {
     taper_message_t message;
     bool bad_field = false;
     if (!find_sender(station, frame, &sender)) {
+        taper_strangers_hear(station, frame);
         taper_station_count(station, TAPER_COUNTER_FRAMES_UNKNOWN);
         return;
     }

@@ -74,8 +74,8 @@ bool taper_health_may_plan(taper_health_t *health, uint32_t now_ms) {
     return !health->off;
 }
 
-bool taper_self_ticked(taper_self_t *self, uint32_t took_ms, uint32_t tick_ms) {
-    self->overran = took_ms > tick_ms / 2;
+bool taper_self_ticked(taper_self_t *self, uint32_t late_ms, uint32_t tick_ms) {
+    self->overran = late_ms > tick_ms / 2;
     if (self->overruns < TAPER_RESET_OVERRUNS) {
         self->overruns = self->overran ? (uint8_t)(self->overruns + 1) : 0;
     }

@@ -41,7 +41,7 @@ bool bench_from_peer(bench_peer_t *peer, taper_transfer_result_t *result);
 /** One frame from the station, to whoever of gateway, tool and `peer` it is for. */
 bool bench_to_peer(bench_peer_t *peer);
 
-/** Move frames until all is quiet; a curve is answered with ACCEPTED. @return the last result other than NONE. */
+/** Move frames until all is quiet; a curve of limits or prices is answered with ACCEPTED. @return the last result other than NONE. */
 taper_transfer_result_t bench_settle(bench_peer_t *peer);
 
 /** Send a whole message and settle. */

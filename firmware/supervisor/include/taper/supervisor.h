@@ -63,11 +63,11 @@ typedef struct {
 } taper_self_t;
 
 /**
- * A tick took `took_ms` of `tick_ms`. More than half of it is too long: setpoints are to be on the bus half a tick after it
- * began at the latest (docs/protocol.md, Faults), and the other half is for polls, in which currents are handed over.
+ * A tick began `late_ms` late: so much longer than `tick_ms` took the one before, or what ran beside it. More than half a
+ * tick is too long: setpoints are to be on the bus half a tick late at the latest (docs/protocol.md, Faults).
  * @return whether it was too long.
  */
-bool taper_self_ticked(taper_self_t *self, uint32_t took_ms, uint32_t tick_ms);
+bool taper_self_ticked(taper_self_t *self, uint32_t late_ms, uint32_t tick_ms);
 
 /** A setpoint differed from its inverse. */
 void taper_self_flipped(taper_self_t *self);

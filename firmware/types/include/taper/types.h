@@ -164,6 +164,7 @@ typedef struct {
     bool active;             /**< a vehicle is there, is sound, and still wants energy */
     bool soc_estimated;      /**< `stored_Wh` rests on measured energy because the reported SOC is stale */
     uint8_t session;         /**< wire number of the session on this connector */
+    uint8_t conductors;      /**< phases of the connector that the vehicle may use: 1..3 */
     int32_t stored_Wh;       /**< energy in the battery, >= 0; 0 if SOC or capacity is unknown */
     int32_t capacity_Wh;     /**< > 0, or 0: unknown (no taper then) */
     int32_t need_Wh;         /**< energy still wanted, > 0 */
