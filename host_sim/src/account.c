@@ -45,10 +45,13 @@ void sim_account_begin(sim_account_t *account, int64_t now_s, double limit_kw) {
 }
 
 void sim_account_obey(sim_account_t *account) {
+    bool changed = false;
     for (unsigned i = 0; i < connectors(account); i++) {
-        sim_fleet_draw(account->fleet, i, account->at_s);
+        changed = sim_fleet_draw(account->fleet, i, account->at_s) || changed;
     }
-    check(account);
+    if (changed) {
+        check(account);
+    }
 }
 
 void sim_account_pass(sim_account_t *account, double now_s) {

@@ -72,11 +72,11 @@ static double stay_h(const sim_evse_t *evse, double from_s, double to_s) {
     return fmax(fmin(to_s, evse->vehicle->departure_s) - from_s, 0.0) / 3600.0;
 }
 
-void sim_fleet_draw(sim_fleet_t *fleet, unsigned connector, double now_s) {
+bool sim_fleet_draw(sim_fleet_t *fleet, unsigned connector, double now_s) {
     sim_evse_t *evse = &fleet->evse[connector];
     const int32_t offered_mA = sim_evse_wants(evse) ? sim_evse_offered_mA(evse, evse->setpoint_mA) : 0;
     if (offered_mA == fleet->offered_mA[connector]) {
-        return;
+        return false;
     }
     fleet->offered_mA[connector] = offered_mA;
     evse->power_kw = 0.0;
@@ -86,6 +86,7 @@ void sim_fleet_draw(sim_fleet_t *fleet, unsigned connector, double now_s) {
         const double missing_kw = sim_evse_missing_kwh(evse) / left_h;
         sim_evse_draw(evse, offered_mA, fmin(fleet->takes_kw[connector], missing_kw));
     }
+    return true;
 }
 
 double sim_fleet_charge(sim_fleet_t *fleet, unsigned connector, double from_s, double to_s) {

@@ -51,8 +51,8 @@ void sim_fleet_take(sim_fleet_t *fleet, const taper_frame_t *frame);
 void sim_fleet_hear(sim_fleet_t *fleet);
 
 /** From `now_s` on, a time in the present tick, a connector's vehicle draws by the setpoint that the connector obeys. It
-    goes on as before if that offers no other current. */
-void sim_fleet_draw(sim_fleet_t *fleet, unsigned connector, double now_s);
+    goes on as before if that offers no other current. @return whether it is another. */
+bool sim_fleet_draw(sim_fleet_t *fleet, unsigned connector, double now_s);
 
 /** The time from `from_s` to `to_s` passes, in the present tick: the battery gets its energy. @return that [kWh]. */
 double sim_fleet_charge(sim_fleet_t *fleet, unsigned connector, double from_s, double to_s);

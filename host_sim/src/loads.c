@@ -4,11 +4,19 @@
 #include <stdio.h>
 
 /** Less above a limit than this is rounding of doubles [kW, A]. */
-#define TOLERANCE 1e-6
-#define PI        3.14159265358979323846
+#define TOLERANCE  1e-6
+#define HALF_SQRT3 0.86602540378443864676
 
-static double complex unit(double degrees) {
-    return CMPLX(cos(degrees * PI / 180.0), sin(degrees * PI / 180.0));
+/** Voltage of a phase to neutral, as a number of length 1. */
+static double complex star(unsigned phase) {
+    static const double sine[] = {0.0, -HALF_SQRT3, HALF_SQRT3};
+    return CMPLX(phase == 0 ? 1.0 : -0.5, sine[phase]);
+}
+
+/** Voltage from a phase to the next one. */
+static double complex delta(unsigned phase) {
+    static const double cosine[] = {HALF_SQRT3, 0.0, -HALF_SQRT3};
+    return CMPLX(cosine[phase], phase == 1 ? -1.0 : 0.5);
 }
 
 /** Supply phase (0..2) of a connector's conductor. */
@@ -20,13 +28,13 @@ static unsigned phase_of(const taper_connector_config_t *connector, unsigned con
 /** Current between two phases: it comes in by one line and goes back by the other. */
 static void add_pair(sim_load_t *load, unsigned one, unsigned other, double current_A) {
     const unsigned from = (one + 1) % 3 == other ? one : other; // as L1-L2, L2-L3 or L3-L1
-    const double complex between_A = current_A * unit(30.0 - 120.0 * (double)from);
+    const double complex between_A = current_A * delta(from);
     load->line_A[from] += between_A;
     load->line_A[(from + 1) % 3] -= between_A;
 }
 
 static void add_phase(sim_load_t *load, unsigned phase, double current_A) {
-    load->line_A[phase] += current_A * unit(-120.0 * (double)phase);
+    load->line_A[phase] += current_A * star(phase);
 }
 
 sim_load_t sim_load_of(const taper_station_config_t *station, unsigned i, unsigned conductors,
