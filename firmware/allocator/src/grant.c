@@ -3,28 +3,18 @@
 #include "taper/allocator.h"
 #include "taper/ledger.h"
 
-/** Column of a kind of row; `columns`: no group has such a row. */
-static uint8_t column_of(const taper_rooms_t *rooms, int kind) {
-    uint8_t column = 0;
-    while (column < rooms->columns && rooms->kind[column] != kind) {
-        column++;
-    }
-    return column;
-}
-
 /**
  * The current of a delta line is bounded by two rows together, and a connector may be in one of them only. What the other one
  * is overdrawn by leaves it no room either: the current would rise, though no row did.
  */
 static void share_excess(taper_rooms_t *rooms, uint8_t group_count) {
-    for (int line = 0; line < 3; line++) {
-        const uint8_t first = column_of(rooms, TAPER_ROW_DELTA_L1 + line);
-        const uint8_t second = column_of(rooms, TAPER_ROW_DELTA_L1_B + line);
-        for (uint8_t k = 0; k < group_count && second < rooms->columns; k++) {
-            int64_t *room = rooms->room[k];
-            const int64_t least = room[first] < room[second] ? room[first] : room[second];
+    for (uint8_t k = 0; k < group_count; k++) {
+        for (int line = 0; line < 3; line++) {
+            int64_t *first = &rooms->room[k][TAPER_ROW_DELTA_L1 + line];
+            int64_t *second = &rooms->room[k][TAPER_ROW_DELTA_L1_B + line];
+            const int64_t least = *first < *second ? *first : *second;
             if (least < 0) {
-                room[first] = room[second] = least;
+                *first = *second = least;
             }
         }
     }
