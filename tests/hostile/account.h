@@ -133,6 +133,8 @@ typedef struct {
 typedef struct {
     uint64_t violations[RULES];
     uint64_t checks, frames;
+    uint64_t vehicles,
+        charging;         /**< over all checks: connectors with a vehicle, and with a setpoint above 0 */
     double margin[RULES]; /**< least distance to a limit, W or A */
     bool failed;
     rule_t first;

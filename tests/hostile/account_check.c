@@ -162,6 +162,8 @@ void account_check(account_t *account) {
     account_supply_note(account);
     for (unsigned i = 0; i < account->config->connector_count; i++) {
         const unsigned conductors = account->book[i].conductors;
+        account->verdict.vehicles += account->book[i].plugged ? 1u : 0u;
+        account->verdict.charging += account->book[i].level_mA > 0 ? 1u : 0u;
         add_equally(&legal, account, i, conductors, account_legal_mA(account, i));
         add_equally(&stuck, account, i, conductors, account_stuck_mA(account, i));
     }

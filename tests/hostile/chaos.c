@@ -98,7 +98,7 @@ static void come_and_go(world_t *world, unsigned i) {
         node->plug_ms = world->now_ms + random_in(random, 0, random_once_in(random, 4) ? 3000 : 90000);
     } else {
         plug(world, i);
-        node->plug_ms = world->now_ms + random_in(random, 20000, random_once_in(random, 4) ? 60000 : 1500000);
+        node->plug_ms = world->now_ms + random_in(random, 20000, random_once_in(random, 4) ? 60000 : 600000);
     }
 }
 
