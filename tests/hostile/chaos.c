@@ -228,7 +228,8 @@ static int64_t fair_bound_ms(const world_t *world) {
 
 static void change_policy(world_t *world) {
     if (world->era != ERA_FAIR && random_once_in(&world->random, 100)) {
-        world->policy = (policy_t)random_below(&world->random, POLICIES);
+        world->policy = random_once_in(&world->random, 2) ? POLICY_EQUAL
+                                                          : (policy_t)random_below(&world->random, POLICIES);
     }
 }
 

@@ -33,12 +33,15 @@ void gateway_hold(gateway_t *gateway, int32_t limit_W) {
 /** Anything from far below nothing to far above what the site has; often what matters. */
 static int32_t some_limit(gateway_t *gateway) {
     const int32_t built = gateway->config->groups[0].limit_W / 100;
-    switch (random_below(gateway->random, 8)) {
+    switch (random_below(gateway->random, 14)) {
     case 0: return 0;
     case 1: return random_in(gateway->random, -32767, -1);
     case 2: return random_in(gateway->random, 1, 30);
     case 3: return random_in(gateway->random, built, 32767);
-    default: return random_in(gateway->random, 20, built);
+    case 4:
+    case 5:
+    case 6: return random_in(gateway->random, 20, built / 3);
+    default: return random_in(gateway->random, built / 3, built);
     }
 }
 
@@ -48,7 +51,7 @@ static void change_limit(gateway_t *gateway) {
     gateway->active = !random_once_in(random, 12);
     gateway->limit_absent = random_once_in(random, 25);
     gateway->flaps = random_once_in(random, 12);
-    gateway->validity_s = random_once_in(random, 6) ? (uint8_t)random_in(random, 0, 8) : 0xFF;
+    gateway->validity_s = random_once_in(random, 10) ? (uint8_t)random_in(random, 0, 8) : 0xFF;
     gateway->changes++;
 }
 
@@ -57,7 +60,7 @@ static void change_other_load(gateway_t *gateway) {
     gateway->other_absent = random_once_in(random, 20);
     for (unsigned phase = 0; phase < 3; phase++) {
         gateway->other_dA[phase] =
-            random_once_in(random, 10) ? random_in(random, -3000, 3000) : random_in(random, -100, 250);
+            random_once_in(random, 10) ? random_in(random, -2000, 2000) : random_in(random, -50, 150);
     }
 }
 

@@ -71,7 +71,7 @@ void node_plug(node_t *node, lie_t lie) {
     node->min_mA = random_once_in(random, 5) ? random_in(random, 0, 16000) : 6000;
     node->over_factor = 1.0 + random_in(random, 10, 150) / 100.0;
     node->capacity_Wh = random_in(random, 10, 100) * 1000.0;
-    node->wanted_Wh = random_once_in(random, 4) ? 300.0 : node->capacity_Wh * 0.6;
+    node->wanted_Wh = random_once_in(random, 6) ? 500.0 : node->capacity_Wh * 0.6;
     node->absurd = random_once_in(random, 12);
     node->pauses = random_once_in(random, 15);
     node->voltage_mV = (uint32_t)(node->config->voltage_mV / 100 * random_in(random, 95, 103));
