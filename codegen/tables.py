@@ -80,10 +80,17 @@ const taper_station_config_t taper_station_{name} = {{
     .groups = {name}_groups,
     .failsafe_W = {station.failsafe_W},
     .other_load_W = {station.other_load_W},
+    .other_load_mA = {station.other_load_mA},
     .site_voltage_mV = {station.site_voltage_mV},
     .tick_ms = {station.tick_ms},
     .min_on_ms = {station.min_on_ms},
     .min_off_ms = {station.min_off_ms},
+    .turn_ms = {station.turn_ms},
+    .change_ms = {station.change_ms},
+    .ramp_mA_per_s = {station.ramp_mA_per_s},
+    .deadband_mA = {station.deadband_mA},
+    .price_weight_permille = {station.price_weight_permille},
+    .line_to_line = {_bool(station.line_to_line)},
     .step_s = {station.step_s},
     .steps = {station.steps},
     .connector_count = {len(station.connectors)},
@@ -93,19 +100,39 @@ const taper_station_config_t taper_station_{name} = {{
 
 
 def _group(group: Group) -> str:
-    parent = "TAPER_NO_GROUP" if group.parent is None else str(group.parent)
-    return f"{{.limit_W = {group.limit_W}, .parent = {parent}}}, /* {group.name} */"
+    limits = {
+        "limit_W": group.limit_W,
+        "limit_mA": group.limit_mA,
+        "delta_mA": group.delta_mA,
+        "imbalance_mA": group.imbalance_mA,
+        "parent": "TAPER_NO_GROUP" if group.parent is None else group.parent,
+    }
+    return f"{_initializer(limits)} /* {group.name} */"
 
 
 def _connector(connector: Connector) -> str:
-    fields = {
-        "min_mA": connector.min_mA,
-        "max_mA": connector.max_mA,
-        "voltage_mV": connector.voltage_mV,
-        "phases": connector.phases,
-        "group": connector.group,
-        "bus": connector.bus,
-        "node": connector.node,
-        "is_dc": "true" if connector.kind == "DC" else "false",
-    }
+    return _initializer(
+        {
+            "min_mA": connector.min_mA,
+            "max_mA": connector.max_mA,
+            "fallback_mA": connector.fallback_mA,
+            "voltage_mV": connector.voltage_mV,
+            "reaction_ms": connector.reaction_ms,
+            "efficiency_permille": connector.efficiency_permille,
+            "phases": connector.phases,
+            "rotation": f"TAPER_ROTATION_{connector.rotation}",
+            "line_to_line": _bool(connector.line_to_line),
+            "group": connector.group,
+            "bus": connector.bus,
+            "node": connector.node,
+            "is_dc": _bool(connector.kind == "DC"),
+        }
+    )
+
+
+def _initializer(fields: dict[str, int | str]) -> str:
     return "{" + ", ".join(f".{name} = {value}" for name, value in fields.items()) + "},"
+
+
+def _bool(value: bool) -> str:
+    return "true" if value else "false"

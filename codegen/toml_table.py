@@ -112,11 +112,13 @@ class Table:
             raise self.error(key, f"must be {least} to {most}, not {value}")
         return value
 
-    def quantity(self, key: str, least: int, most: int, per_unit: int) -> int:
+    def quantity(self, key: str, least: int, most: int, per_unit: int, default: int | None = None) -> int:
         """A decimal number as an integer count of 1/per_unit, which it must be a multiple of.
 
-        `least` and `most` are such counts: 0.1 A are quantity(key, ..., per_unit=10).
+        `least`, `most` and `default` are such counts: 0.1 A are quantity(key, ..., per_unit=10).
         """
+        if default is not None and not self.has(key):
+            return default
         value = self._get(key, float)
         if not math.isfinite(value):
             raise self.error(key, f"must be finite, not {value}")

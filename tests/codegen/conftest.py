@@ -11,7 +11,7 @@ from cantools.database.can import Database
 
 ROOT = Path(__file__).resolve().parents[2]
 CODEGEN = ROOT / "codegen"
-STATIONS = ("hub", "garage", "paper", "depot")
+STATIONS = ("hub", "garage", "paper", "depot", "caltech")
 sys.path.insert(0, str(CODEGEN))
 
 from bus_dbc import compact_dbc  # noqa: E402  (found by the path above)

@@ -64,19 +64,41 @@ static void check_session(const taper_session_t *session) {
     check_that(session->jump_count <= TAPER_SOC_JUMP_REPORTS, "jump_count", session->jump_count);
 }
 
+static void check_curve(const taper_limit_curve_t *curve) {
+    check_that(curve->count <= TAPER_MAX_LIMIT_POINTS, "curve.count", curve->count);
+    for (uint16_t k = 0; k < curve->count; k++) {
+        check_that(curve->point[k].limit_W >= 0, "curve.limit_W", curve->point[k].limit_W);
+        check_that(k == 0 || !taper_time_reached(curve->point[k - 1].time_ms, curve->point[k].time_ms),
+                   "curve out of order at", k);
+    }
+}
+
+static void check_price(const taper_price_curve_t *price) {
+    check_that(price->count <= TAPER_MAX_PRICE_POINTS, "price.count", price->count);
+    for (uint16_t k = 0; k < price->count; k++) {
+        check_that(price->point[k].milli_per_kWh >= -32767 && price->point[k].milli_per_kWh <= 32767,
+                   "price.milli_per_kWh", price->point[k].milli_per_kWh);
+        check_that(k == 0 || !taper_time_reached(price->point[k - 1].time_ms, price->point[k].time_ms),
+                   "price out of order at", k);
+    }
+}
+
 static void check_limits(const taper_station_t *station) {
     const taper_limits_t *limits = &station->limits;
     const int32_t site_W = station->options.config->groups[0].limit_W;
     check_that(limits->gateway_W >= 0, "gateway_W", limits->gateway_W);
     check_that(limits->failsafe_W >= 0 && limits->failsafe_W <= site_W, "failsafe_W", limits->failsafe_W);
-    check_that(limits->curve.count <= TAPER_MAX_LIMIT_POINTS, "curve.count", limits->curve.count);
-    for (uint16_t k = 0; k < limits->curve.count; k++) {
-        check_that(limits->curve.point[k].limit_W >= 0, "curve.limit_W", limits->curve.point[k].limit_W);
-        check_that(
-            k == 0 || !taper_time_reached(limits->curve.point[k - 1].time_ms, limits->curve.point[k].time_ms),
-            "curve out of order at", k);
+    for (unsigned k = 0; k < TAPER_CURVE_OWNERS; k++) {
+        check_curve(&limits->curve[k]);
     }
+    check_price(&limits->price);
+    check_that(limits->flap.count <= TAPER_FLAP_LIMITS, "flap.count", limits->flap.count);
     check_that(limits->metered_W >= 0, "metered_W", limits->metered_W);
+    for (unsigned phase = 0; phase < 3; phase++) {
+        const int32_t phase_mA = station->limit_now.supply.phase_mA[phase];
+        check_that(limits->metered_mA[phase] >= 0, "metered_mA", limits->metered_mA[phase]);
+        check_that(phase_mA >= 0, "limit_now.supply.phase_mA", phase_mA);
+    }
     check_that(station->limit_now.other_W >= 0, "limit_now.other_W", station->limit_now.other_W);
     check_that(station->limit_now.supply.site_W >= 0 && station->limit_now.supply.site_W <= site_W,
                "limit_now.supply.site_W", station->limit_now.supply.site_W);

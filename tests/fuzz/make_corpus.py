@@ -119,6 +119,10 @@ def curve(points: int, step_s: int = 900, start_s: int = 600000) -> bytes:
     return b"".join(struct.pack("<IH", start_s + k * step_s, 400 - 10 * k) for k in range(points))
 
 
+def price_curve(points: int, step_s: int = 900, start_s: int = 600000) -> bytes:
+    return b"".join(struct.pack("<Ih", start_s + k * step_s, 40 - 20 * k) for k in range(points))
+
+
 def raw_isotp(*frames: str, node: int = GATEWAY) -> bytes:
     return b"".join(record(ISOTP_FROM << 6 | node, bytes.fromhex(text), then=5, flags=0) for text in frames)
 
@@ -174,6 +178,8 @@ def transfers() -> dict[str, bytes]:
     return {
         "curve": charging(2) + transfer(1, curve(8), 8) + charging(3),
         "curve-out-of-order": charging(2) + transfer(1, curve(4)[::-1], 4) + transfer(1, curve(4), 5),
+        "price-curve": charging(2) + transfer(2, price_curve(30), 30) + charging(3) + transfer(2, price_curve(4), 5)
+        + transfer(2, b"", 0) + charging(1),
         "identifiers": charging(2) + transfer(3, b"DE*ABC*E1234567*", 16, 1) + transfer(5, b"", 0, TOOL)
         + raw_isotp("3000000000000000", node=TOOL) * 3 + charging(2),
         "isotp-nonsense": charging(1) + raw_isotp(*torn, "1fff010100000000", "30000000000000", "32ffff0000000000",

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 TOOLS = Path(__file__).resolve().parents[2] / "tools"
-STATIONS = ("hub", "garage", "paper", "depot")
+STATIONS = ("hub", "garage", "paper", "depot", "caltech")
 
 
 def run(tool: str, *arguments: str) -> str:

@@ -80,7 +80,7 @@ static void assert_the_fall_is_known(void) {
 }
 
 static void assert_nothing_is_known(void) {
-    TEST_ASSERT_EQUAL_UINT16(0, live.station.limits.curve.count);
+    TEST_ASSERT_EQUAL_UINT16(0, live.station.limits.curve[TAPER_CURVE_OF_GATEWAY].count);
 }
 
 static void lose(uint16_t id, uint16_t drop_permille) {
@@ -227,10 +227,10 @@ static void test_a_course_too_long_for_one_transfer_comes_in_parts(void) {
     start_under_limits(60);
     live_bench_run_ms(12000);
     TEST_ASSERT_EQUAL_UINT32(1, curves_noted());
-    TEST_ASSERT_GREATER_THAN_UINT16(TAPER_MAX_LIMIT_POINTS - 10, live.station.limits.curve.count);
+    TEST_ASSERT_GREATER_THAN_UINT16(TAPER_MAX_LIMIT_POINTS - 10, live.station.limits.curve[TAPER_CURVE_OF_GATEWAY].count);
     live_bench_run_ms(120000);
     TEST_ASSERT_GREATER_THAN_UINT32(4, curves_noted());
-    TEST_ASSERT_GREATER_THAN_UINT16(TAPER_MAX_LIMIT_POINTS - 20, live.station.limits.curve.count);
+    TEST_ASSERT_GREATER_THAN_UINT16(TAPER_MAX_LIMIT_POINTS - 20, live.station.limits.curve[TAPER_CURVE_OF_GATEWAY].count);
 }
 
 /** Begin to send to nobody, so that the message can be looked at. */

@@ -74,9 +74,64 @@ static void test_llf_counts_the_taper(void) {
     TEST_ASSERT_EQUAL_UINT8(1, proposal.rank[0]);
 }
 
+static void test_llf_ranks_all_whatever_was_ranked_before(void) {
+    taper_snapshot_t snapshot = scene_snapshot(0, 4);
+    taper_proposal_t proposal;
+    for (int turn = 0; turn < 2; turn++) {
+        for (uint8_t i = 0; i < 4; i++) {
+            snapshot.demand[i].departs_in_s = turn == 0 ? 50000 - 1000 * i : 50000 + 1000 * i;
+        }
+        taper_propose_llf(&snapshot, 1000, &proposal);
+        const uint8_t falling[] = {3, 2, 1, 0};
+        const uint8_t rising[] = {0, 1, 2, 3};
+        assert_rank(turn == 0 ? falling : rising, &proposal);
+    }
+}
+
 static void test_llf_puts_a_vehicle_that_cannot_charge_last(void) {
     taper_snapshot_t snapshot = scene_snapshot(0, 2);
     snapshot.demand[0].peak_W = 0;
+    taper_proposal_t proposal;
+    taper_propose_llf(&snapshot, 1000, &proposal);
+    TEST_ASSERT_EQUAL_UINT8(1, proposal.rank[0]);
+}
+
+static void test_llf_wishes_for_all_that_is_useful_as_well(void) {
+    taper_snapshot_t snapshot = scene_snapshot(0, 3);
+    taper_proposal_t proposal = scene_proposal(77);
+    snapshot.demand[1].taper_W = 6000;
+    taper_propose_llf(&snapshot, 1000, &proposal);
+    const int32_t useful_W[] = {7360, 4360, 7360, 0};
+    TEST_ASSERT_EQUAL_INT32_ARRAY(useful_W, proposal.wish_W, 4);
+    TEST_ASSERT_EQUAL_INT32_ARRAY(useful_W, proposal.ceiling_W, 4);
+}
+
+static void test_nothing_is_written_beyond_the_connectors_of_the_snapshot(void) {
+    taper_snapshot_t snapshot = scene_snapshot(0, 4);
+    taper_proposal_t proposal;
+    proposal.wish_W[3] = proposal.ceiling_W[3] = 4711;
+    proposal.rank[3] = 99;
+    snapshot.count = 3;
+    taper_propose_edf(&snapshot, 1000, &proposal);
+    TEST_ASSERT_EQUAL_INT32(4711, proposal.wish_W[3]);
+    TEST_ASSERT_EQUAL_INT32(4711, proposal.ceiling_W[3]);
+    TEST_ASSERT_EQUAL_UINT8(99, proposal.rank[3]);
+}
+
+static void test_a_laxity_is_exact_to_the_second(void) {
+    taper_snapshot_t snapshot = scene_snapshot(0, 2);
+    snapshot.demand[0].need_Wh = 73600; /* ten hours at 7360 W: ten seconds to spare */
+    snapshot.demand[0].departs_in_s = 36010;
+    snapshot.demand[1].need_Wh = 7360; /* one hour, five seconds to spare */
+    snapshot.demand[1].departs_in_s = 3605;
+    taper_proposal_t proposal;
+    taper_propose_llf(&snapshot, 1000, &proposal);
+    TEST_ASSERT_EQUAL_UINT8(1, proposal.rank[0]);
+}
+
+static void test_a_vehicle_that_takes_a_single_watt_can_charge(void) {
+    taper_snapshot_t snapshot = scene_snapshot(0, 2);
+    snapshot.demand[1].peak_W = 1; /* years late */
     taper_proposal_t proposal;
     taper_propose_llf(&snapshot, 1000, &proposal);
     TEST_ASSERT_EQUAL_UINT8(1, proposal.rank[0]);
@@ -91,6 +146,11 @@ int main(void) {
     RUN_TEST(test_wishes_are_clamped_to_the_taper);
     RUN_TEST(test_llf_prefers_the_vehicle_with_the_least_time_to_spare);
     RUN_TEST(test_llf_counts_the_taper);
+    RUN_TEST(test_llf_ranks_all_whatever_was_ranked_before);
     RUN_TEST(test_llf_puts_a_vehicle_that_cannot_charge_last);
+    RUN_TEST(test_llf_wishes_for_all_that_is_useful_as_well);
+    RUN_TEST(test_nothing_is_written_beyond_the_connectors_of_the_snapshot);
+    RUN_TEST(test_a_laxity_is_exact_to_the_second);
+    RUN_TEST(test_a_vehicle_that_takes_a_single_watt_can_charge);
     return UNITY_END();
 }

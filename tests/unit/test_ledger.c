@@ -24,7 +24,7 @@ static void wait_ms(uint32_t ms) {
 void setUp(void) {
     now_ms = START_ms;
     taper_ledger_init(&ledger, scene_four(), VALIDITY_ms, 1, now_ms);
-    wait_ms(VALIDITY_ms); /* nothing of an earlier life is left */
+    wait_ms(EXPIRED_ms); /* nothing of an earlier life is left */
     snapshot = scene_snapshot(now_ms, 4);
     memset(&target, 0, sizeof target);
     for (uint8_t i = 0; i < 4; i++) {
@@ -61,9 +61,9 @@ static void grant(int32_t site_limit_W) {
 static void test_at_the_start_a_connector_may_draw_its_maximum_until_old_setpoints_have_expired(void) {
     now_ms = START_ms;
     taper_ledger_init(&ledger, scene_four(), VALIDITY_ms, 1, now_ms);
-    wait_ms(VALIDITY_ms - 1);
+    wait_ms(EXPIRED_ms - 1);
     TEST_ASSERT_EQUAL_INT32(32000, taper_ledger_may_mA(&ledger, 0));
-    TEST_ASSERT_EQUAL_INT32(0, taper_ledger_told_mA(&ledger, 0));
+    TEST_ASSERT_EQUAL_INT32(32000, taper_ledger_told_mA(&ledger, 0));
     wait_ms(1);
     TEST_ASSERT_EQUAL_INT32(0, taper_ledger_may_mA(&ledger, 0));
 }
@@ -164,8 +164,35 @@ static void test_of_sixteen_setpoints_without_an_echo_none_is_sent_over_another(
     TEST_ASSERT_FALSE(taper_ledger_can_send(&ledger, 0, 0));
     TEST_ASSERT_TRUE(taper_ledger_can_send(&ledger, 1, 0));
     TEST_ASSERT_EQUAL_INT32(2500, taper_ledger_may_mA(&ledger, 0));
-    wait_ms(EXPIRED_ms);
-    TEST_ASSERT_TRUE(taper_ledger_can_send(&ledger, 0, 0));
+}
+
+static void test_a_counter_is_free_again_when_no_report_can_name_the_setpoint_that_had_it(void) {
+    send(0, 3, 16000);
+    wait_ms(EXPIRED_ms + TAPER_LEDGER_LATE_ms - 1);
+    TEST_ASSERT_EQUAL_INT32(0, taper_ledger_may_mA(&ledger, 0));
+    TEST_ASSERT_FALSE(taper_ledger_can_send(&ledger, 0, 3));
+    wait_ms(1);
+    TEST_ASSERT_TRUE(taper_ledger_can_send(&ledger, 0, 3));
+}
+
+static void test_a_counter_is_free_at_once_when_a_later_one_was_echoed(void) {
+    send(0, 3, 16000);
+    wait_ms(1);
+    send(0, 4, 16000);
+    hear_echo(0, 4);
+    TEST_ASSERT_TRUE(taper_ledger_can_send(&ledger, 0, 3));
+    TEST_ASSERT_FALSE(taper_ledger_can_send(&ledger, 0, 4));
+}
+
+static void test_a_counter_is_free_at_once_when_the_connector_fell_back_or_has_no_vehicle(void) {
+    const taper_evse_status_t absent = {.pilot = TAPER_PILOT_A};
+    send(0, 3, 16000);
+    send(1, 3, 16000);
+    wait_ms(2 * TAPER_LEDGER_LATE_ms);
+    hear_fallback(0);
+    taper_ledger_hear(&ledger, 1, &absent, now_ms);
+    TEST_ASSERT_TRUE(taper_ledger_can_send(&ledger, 0, 3));
+    TEST_ASSERT_TRUE(taper_ledger_can_send(&ledger, 1, 3));
 }
 
 static void test_an_increase_gets_no_more_than_the_room_that_is_left(void) {
@@ -209,7 +236,7 @@ static void test_a_feeder_holds_its_own_connectors_back_only(void) {
     TEST_ASSERT_EQUAL_INT32(26000, granted.current_mA[2]);
 }
 
-static void test_while_the_sum_is_above_a_limit_that_fell_nobody_is_told_more_than_before(void) {
+static void test_while_the_sum_is_above_a_limit_that_fell_nobody_is_told_more_than_last(void) {
     send(0, 0, 20000);
     send(1, 0, 10000);
     target.current_mA[0] = 6000;
@@ -219,6 +246,34 @@ static void test_while_the_sum_is_above_a_limit_that_fell_nobody_is_told_more_th
     TEST_ASSERT_EQUAL_INT32(6000, granted.current_mA[0]);
     TEST_ASSERT_EQUAL_INT32(10000, granted.current_mA[1]);
     TEST_ASSERT_EQUAL_INT32(0, granted.current_mA[2]);
+    send(0, 1, 6000);
+    target.current_mA[0] = 8000; /* it may draw 20 A still, but that has to end */
+    grant(5000);
+    TEST_ASSERT_EQUAL_INT32(6000, granted.current_mA[0]);
+    grant(6900); /* 30 A: exactly what may be drawn */
+    TEST_ASSERT_EQUAL_INT32(8000, granted.current_mA[0]);
+    TEST_ASSERT_EQUAL_INT32(10000, granted.current_mA[1]);
+}
+
+static void test_a_setpoint_that_expired_is_not_told_again_without_room(void) {
+    send(0, 0, 20000);
+    wait_ms(EXPIRED_ms);
+    send(1, 0, 30000);
+    target.current_mA[0] = target.current_mA[1] = 20000;
+    grant(6900 - 230 / 10); /* 0.1 A less than the 30 A of the other */
+    TEST_ASSERT_EQUAL_INT32(0, granted.current_mA[0]);
+    TEST_ASSERT_EQUAL_INT32(20000, granted.current_mA[1]);
+}
+
+static void test_a_rank_that_names_nobody_or_one_twice_harms_nobody(void) {
+    target.current_mA[0] = target.current_mA[1] = 16000;
+    rank[0] = 4;
+    rank[1] = 0;
+    rank[2] = 0;
+    rank[3] = TAPER_MAX_CONNECTORS - 1;
+    grant(9200);
+    TEST_ASSERT_EQUAL_INT32(16000, granted.current_mA[0]);
+    TEST_ASSERT_EQUAL_INT32(0, granted.current_mA[1]);
 }
 
 static void test_what_a_silent_connector_may_draw_counts_by_its_description(void) {
@@ -265,11 +320,16 @@ int main(void) {
     RUN_TEST(test_fallback_ends_what_cannot_have_crossed_the_report);
     RUN_TEST(test_a_setpoint_does_not_outlive_its_vehicle);
     RUN_TEST(test_of_sixteen_setpoints_without_an_echo_none_is_sent_over_another);
+    RUN_TEST(test_a_counter_is_free_again_when_no_report_can_name_the_setpoint_that_had_it);
+    RUN_TEST(test_a_counter_is_free_at_once_when_a_later_one_was_echoed);
+    RUN_TEST(test_a_counter_is_free_at_once_when_the_connector_fell_back_or_has_no_vehicle);
     RUN_TEST(test_an_increase_gets_no_more_than_the_room_that_is_left);
     RUN_TEST(test_what_is_granted_is_at_least_the_minimum_or_nothing);
     RUN_TEST(test_rank_decides_who_gets_the_room);
     RUN_TEST(test_a_feeder_holds_its_own_connectors_back_only);
-    RUN_TEST(test_while_the_sum_is_above_a_limit_that_fell_nobody_is_told_more_than_before);
+    RUN_TEST(test_while_the_sum_is_above_a_limit_that_fell_nobody_is_told_more_than_last);
+    RUN_TEST(test_a_setpoint_that_expired_is_not_told_again_without_room);
+    RUN_TEST(test_a_rank_that_names_nobody_or_one_twice_harms_nobody);
     RUN_TEST(test_what_a_silent_connector_may_draw_counts_by_its_description);
     RUN_TEST(test_phases_that_are_not_known_are_booked_when_granting);
     RUN_TEST(test_the_guard_of_the_hand_over_refuses_what_is_not_paid_for);

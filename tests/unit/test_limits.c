@@ -70,6 +70,13 @@ static void test_a_heartbeat_without_a_limit_does_not_keep_the_old_one_alive(voi
     TEST_ASSERT_FALSE(taper_limits_gateway_alive(&limits, 6000));
 }
 
+static void test_a_limit_of_zero_leaves_nothing_at_once(void) {
+    gateway_says(20000, 0);
+    gateway_says(0, 1000);
+    assert_now(0, TAPER_LIMIT_GATEWAY, 1000);
+    TEST_ASSERT_EQUAL_UINT32(0, limits.negative);
+}
+
 static void test_a_negative_limit_counts_as_zero_and_is_counted(void) {
     gateway_says(-100, 0);
     assert_now(0, TAPER_LIMIT_GATEWAY, 0);
@@ -86,7 +93,7 @@ static void test_the_gateway_can_set_the_failsafe_limit_within_what_was_built(vo
 static void test_the_curve_steps_at_its_points(void) {
     point(1000, 15000);
     point(2000, 10000);
-    TEST_ASSERT_EQUAL(TAPER_OK, taper_limits_set_curve(&limits, &curve));
+    TEST_ASSERT_EQUAL(TAPER_OK, taper_limits_set_curve(&limits, TAPER_CURVE_OF_GATEWAY, &curve));
     gateway_says(25000, 500);
     assert_now(25000, TAPER_LIMIT_STATION, 999);
     assert_now(15000, TAPER_LIMIT_CURVE, 1000);
@@ -96,15 +103,15 @@ static void test_the_curve_steps_at_its_points(void) {
 
 static void test_a_curve_out_of_order_is_refused_and_the_old_one_stays(void) {
     point(1000, 15000);
-    TEST_ASSERT_EQUAL(TAPER_OK, taper_limits_set_curve(&limits, &curve));
+    TEST_ASSERT_EQUAL(TAPER_OK, taper_limits_set_curve(&limits, TAPER_CURVE_OF_GATEWAY, &curve));
     point(1000, 10000);
-    TEST_ASSERT_EQUAL(TAPER_ERR_ARGUMENT, taper_limits_set_curve(&limits, &curve));
+    TEST_ASSERT_EQUAL(TAPER_ERR_ARGUMENT, taper_limits_set_curve(&limits, TAPER_CURVE_OF_GATEWAY, &curve));
     curve.point[1] = (taper_limit_point_t){2000, -1};
-    TEST_ASSERT_EQUAL(TAPER_ERR_ARGUMENT, taper_limits_set_curve(&limits, &curve));
+    TEST_ASSERT_EQUAL(TAPER_ERR_ARGUMENT, taper_limits_set_curve(&limits, TAPER_CURVE_OF_GATEWAY, &curve));
     curve.point[1] = (taper_limit_point_t){1000 + TAPER_CURVE_SPAN_ms + 1, 10000};
-    TEST_ASSERT_EQUAL(TAPER_ERR_ARGUMENT, taper_limits_set_curve(&limits, &curve));
+    TEST_ASSERT_EQUAL(TAPER_ERR_ARGUMENT, taper_limits_set_curve(&limits, TAPER_CURVE_OF_GATEWAY, &curve));
     curve.count = TAPER_MAX_LIMIT_POINTS + 1;
-    TEST_ASSERT_EQUAL(TAPER_ERR_ARGUMENT, taper_limits_set_curve(&limits, &curve));
+    TEST_ASSERT_EQUAL(TAPER_ERR_ARGUMENT, taper_limits_set_curve(&limits, TAPER_CURVE_OF_GATEWAY, &curve));
     gateway_says(25000, 2000);
     assert_now(15000, TAPER_LIMIT_CURVE, 2000);
 }
@@ -113,7 +120,7 @@ static void test_the_course_has_the_limit_of_now_first_and_then_means(void) {
     taper_course_t course;
     point(0, 20000);
     point(900000 + 450000, 10000); /* in the middle of the second step */
-    TEST_ASSERT_EQUAL(TAPER_OK, taper_limits_set_curve(&limits, &curve));
+    TEST_ASSERT_EQUAL(TAPER_OK, taper_limits_set_curve(&limits, TAPER_CURVE_OF_GATEWAY, &curve));
     gateway_says(20000, 0);
     taper_limits_course(&limits, 0, &course);
     TEST_ASSERT_EQUAL_INT32(20000, course.limit_W[0]);
@@ -126,7 +133,7 @@ static void test_the_course_knows_of_rises(void) {
     taper_course_t course;
     point(0, 5050);
     point(900000, 20000);
-    TEST_ASSERT_EQUAL(TAPER_OK, taper_limits_set_curve(&limits, &curve));
+    TEST_ASSERT_EQUAL(TAPER_OK, taper_limits_set_curve(&limits, TAPER_CURVE_OF_GATEWAY, &curve));
     gateway_says(5000, 0); /* the curve's 5050 W in the wire's steps of 100 W */
     taper_limits_course(&limits, 0, &course);
     TEST_ASSERT_EQUAL_INT32(5000, course.limit_W[0]);
@@ -137,7 +144,7 @@ static void test_a_limit_that_the_curve_does_not_explain_is_taken_to_last(void) 
     taper_course_t course;
     point(0, 20000);
     point(1800000, 2000);
-    TEST_ASSERT_EQUAL(TAPER_OK, taper_limits_set_curve(&limits, &curve));
+    TEST_ASSERT_EQUAL(TAPER_OK, taper_limits_set_curve(&limits, TAPER_CURVE_OF_GATEWAY, &curve));
     gateway_says(5000, 0);
     taper_limits_course(&limits, 0, &course);
     TEST_ASSERT_EQUAL_INT32(5000, course.limit_W[0]);
@@ -156,7 +163,7 @@ static void test_an_old_limit_does_not_come_back_when_the_clock_has_gone_round(v
 static void test_the_last_point_of_a_curve_holds_for_months(void) {
     point(1000, 20000);
     point(5000, 10000);
-    TEST_ASSERT_EQUAL(TAPER_OK, taper_limits_set_curve(&limits, &curve));
+    TEST_ASSERT_EQUAL(TAPER_OK, taper_limits_set_curve(&limits, TAPER_CURVE_OF_GATEWAY, &curve));
     uint32_t now_ms = 0;
     for (int hour = 0; hour < 24 * 100; hour++) {
         now_ms += 3600000;
@@ -171,7 +178,7 @@ static void test_several_points_within_one_step_are_averaged(void) {
     point(900000, 9000);
     point(1200000, 6000);
     point(1500000, 3000);
-    TEST_ASSERT_EQUAL(TAPER_OK, taper_limits_set_curve(&limits, &curve));
+    TEST_ASSERT_EQUAL(TAPER_OK, taper_limits_set_curve(&limits, TAPER_CURVE_OF_GATEWAY, &curve));
     gateway_says(25000, 0);
     taper_limits_course(&limits, 0, &course);
     TEST_ASSERT_EQUAL_INT32(6000, course.limit_W[1]);
@@ -186,6 +193,7 @@ int main(void) {
     RUN_TEST(test_a_shorter_validity_ends_earlier);
     RUN_TEST(test_the_timeout_survives_the_wrap_of_the_clock);
     RUN_TEST(test_a_heartbeat_without_a_limit_does_not_keep_the_old_one_alive);
+    RUN_TEST(test_a_limit_of_zero_leaves_nothing_at_once);
     RUN_TEST(test_a_negative_limit_counts_as_zero_and_is_counted);
     RUN_TEST(test_the_gateway_can_set_the_failsafe_limit_within_what_was_built);
     RUN_TEST(test_the_curve_steps_at_its_points);

@@ -17,8 +17,8 @@ void setUp(void) {
 void tearDown(void) {}
 
 static void assert_point(uint16_t k, uint32_t time_ms, int32_t limit_W) {
-    TEST_ASSERT_EQUAL_UINT32(time_ms, curve.point[k].time_ms);
-    TEST_ASSERT_EQUAL_INT32(limit_W, curve.point[k].limit_W);
+    TEST_ASSERT_EQUAL_UINT32(time_ms, content.curve.point[k].time_ms);
+    TEST_ASSERT_EQUAL_INT32(limit_W, content.curve.point[k].limit_W);
 }
 
 /** Send points to the station, whose clock stands still. */
@@ -29,12 +29,12 @@ static taper_transfer_result_t take_points(uint16_t count, const uint32_t *unix_
 }
 
 static void assert_refused_with(taper_transfer_answer_t answer, uint16_t length) {
-    const taper_limit_curve_t before = curve;
+    const taper_transfer_content_t before = content;
     const uint32_t refused = transfers.refused;
     TEST_ASSERT_EQUAL(TAPER_RESULT_REFUSED, bench_transfer(&gateway, message, length));
     bench_answered(&gateway, answer);
     TEST_ASSERT_EQUAL_UINT32(refused + 1, transfers.refused);
-    TEST_ASSERT_EQUAL_MEMORY(&before, &curve, sizeof curve);
+    TEST_ASSERT_EQUAL_MEMORY(&before, &content, sizeof content);
 }
 
 static void test_a_curve_arrives_in_the_stations_time_and_is_answered(void) {
@@ -44,8 +44,8 @@ static void test_a_curve_arrives_in_the_stations_time_and_is_answered(void) {
     TEST_ASSERT_EQUAL_UINT16(sizeof by_hand, bench_curve(message, 1, times, limits));
     TEST_ASSERT_EQUAL_HEX8_ARRAY(by_hand, message, 10);
     TEST_ASSERT_EQUAL(TAPER_RESULT_CURVE, bench_transfer(&gateway, message, sizeof by_hand));
-    TEST_ASSERT_EQUAL_UINT16(1, curve.count);
-    TEST_ASSERT_EQUAL_INT32(11000, curve.point[0].limit_W);
+    TEST_ASSERT_EQUAL_UINT16(1, content.curve.count);
+    TEST_ASSERT_EQUAL_INT32(11000, content.curve.point[0].limit_W);
     bench_answered(&gateway, TAPER_ANSWER_ACCEPTED);
     TEST_ASSERT_EQUAL_UINT32(1, transfers.accepted);
     TEST_ASSERT_EQUAL_UINT32(0, transfers.refused);
@@ -71,7 +71,7 @@ static taper_transfer_result_t take_at_once(uint16_t length) {
 
 static void test_times_become_the_stations_clock(void) {
     TEST_ASSERT_EQUAL(TAPER_RESULT_CURVE, take_at_once(bench_curve(message, 3, times, limits)));
-    TEST_ASSERT_EQUAL_UINT16(3, curve.count);
+    TEST_ASSERT_EQUAL_UINT16(3, content.curve.count);
     assert_point(0, BENCH_NOW_ms + 10000, 11000);
     assert_point(1, BENCH_NOW_ms + HOUR * 1000, 0);
     assert_point(2, BENCH_NOW_ms + 2 * HOUR * 1000, 6553500);
@@ -99,7 +99,7 @@ static void test_points_past_become_one_of_now(void) {
     const uint32_t past[] = {0, BENCH_UNIX_s - 100 * 24 * HOUR, BENCH_UNIX_s - 1, BENCH_UNIX_s + 1};
     const uint16_t watts[] = {1, 2, 3, 4};
     TEST_ASSERT_EQUAL(TAPER_RESULT_CURVE, take_at_once(bench_curve(message, 4, past, watts)));
-    TEST_ASSERT_EQUAL_UINT16(2, curve.count);
+    TEST_ASSERT_EQUAL_UINT16(2, content.curve.count);
     assert_point(0, BENCH_NOW_ms, 300);
     assert_point(1, BENCH_NOW_ms + 1000, 400);
 }
@@ -107,15 +107,15 @@ static void test_points_past_become_one_of_now(void) {
 static void test_a_point_of_now_supersedes_those_before_it(void) {
     const uint32_t past[] = {BENCH_UNIX_s - 1, BENCH_UNIX_s};
     TEST_ASSERT_EQUAL(TAPER_RESULT_CURVE, take_at_once(bench_curve(message, 2, past, limits)));
-    TEST_ASSERT_EQUAL_UINT16(1, curve.count);
+    TEST_ASSERT_EQUAL_UINT16(1, content.curve.count);
     assert_point(0, BENCH_NOW_ms, 0);
 }
 
 static void test_a_curve_without_points_is_a_curve_too_even_without_a_clock(void) {
-    curve.count = 7;
+    content.curve.count = 7;
     scene.clock_is_set = false;
     TEST_ASSERT_EQUAL(TAPER_RESULT_CURVE, take_points(0, times, limits));
-    TEST_ASSERT_EQUAL_UINT16(0, curve.count);
+    TEST_ASSERT_EQUAL_UINT16(0, content.curve.count);
 }
 
 static void test_the_longest_curve_is_taken_and_the_limits_accept_it(void) {
@@ -127,11 +127,11 @@ static void test_the_longest_curve_is_taken_and_the_limits_accept_it(void) {
     }
     many[TAPER_MAX_LIMIT_POINTS - 1] = BENCH_UNIX_s + TAPER_CURVE_SPAN_ms / 1000;
     TEST_ASSERT_EQUAL(TAPER_RESULT_CURVE, take_points(TAPER_MAX_LIMIT_POINTS, many, watts));
-    TEST_ASSERT_EQUAL_UINT16(TAPER_MAX_LIMIT_POINTS, curve.count);
-    TEST_ASSERT_EQUAL_INT32(38300, curve.point[TAPER_MAX_LIMIT_POINTS - 1].limit_W);
+    TEST_ASSERT_EQUAL_UINT16(TAPER_MAX_LIMIT_POINTS, content.curve.count);
+    TEST_ASSERT_EQUAL_INT32(38300, content.curve.point[TAPER_MAX_LIMIT_POINTS - 1].limit_W);
     static taper_limits_t site;
     taper_limits_init(&site, transfers.config);
-    TEST_ASSERT_EQUAL(TAPER_OK, taper_limits_set_curve(&site, &curve));
+    TEST_ASSERT_EQUAL(TAPER_OK, taper_limits_set_curve(&site, TAPER_CURVE_OF_GATEWAY, &content.curve));
 }
 
 static void test_a_curve_with_a_point_too_many_is_told_that_there_is_no_room(void) {
@@ -215,7 +215,7 @@ static void test_a_transfer_torn_at_any_frame_leaves_nothing(void) {
         torn++;
         TEST_ASSERT_EQUAL(TAPER_RESULT_NONE, bench_settle(&gateway)); /* it runs into the timeout */
         TEST_ASSERT_EQUAL_UINT32(torn, transfers.refused);
-        TEST_ASSERT_EQUAL_UINT16(0, curve.count);
+        TEST_ASSERT_EQUAL_UINT16(0, content.curve.count);
         bench_not_answered(&gateway);
     }
     TEST_ASSERT_EQUAL_UINT32(3, torn); /* first, and two of three consecutive frames */

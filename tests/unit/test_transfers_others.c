@@ -38,7 +38,7 @@ static void assert_link_free(void) {
 static void test_an_identifier_is_kept_for_its_connector(void) {
     assert_identifier(1, "");
     TEST_ASSERT_EQUAL(TAPER_RESULT_IDENTIFIER, tell(&two, "DE*ABC*E123~ 4"));
-    TEST_ASSERT_EQUAL_UINT8(1, connector);
+    TEST_ASSERT_EQUAL_UINT8(1, content.connector);
     bench_answered(&two, TAPER_ANSWER_ACCEPTED);
     assert_identifier(0, "");
     assert_identifier(1, "DE*ABC*E123~ 4");
@@ -126,13 +126,11 @@ static void test_frames_of_other_functions_are_left_alone(void) {
     for (unsigned id = 0; id < 0x800; id++) {
         if (id >> 6 != TAPER_MESSAGE_ISOTP_FROM) {
             frame.id = (uint16_t)id;
-            TEST_ASSERT_EQUAL(TAPER_RESULT_NONE,
-                              taper_transfers_take(&transfers, &frame, &scene, &curve, &connector));
+            TEST_ASSERT_EQUAL(TAPER_RESULT_NONE, taper_transfers_take(&transfers, &frame, &scene, &content));
         }
     }
     frame.id = 0x640; /* the controller itself */
-    TEST_ASSERT_EQUAL(TAPER_RESULT_NONE,
-                      taper_transfers_take(&transfers, &frame, &scene, &curve, &connector));
+    TEST_ASSERT_EQUAL(TAPER_RESULT_NONE, taper_transfers_take(&transfers, &frame, &scene, &content));
     TEST_ASSERT_EQUAL_UINT32(0, transfers.refused);
     TEST_ASSERT_FALSE(bench_to_peer(&one));
     assert_link_free();
@@ -149,7 +147,7 @@ static void test_nodes_of_the_same_number_on_two_buses_are_two_connectors(void) 
     bench_open_peer(&two, 1, 1);
     TEST_ASSERT_EQUAL(TAPER_RESULT_IDENTIFIER, tell(&one, "ON-BUS-0"));
     TEST_ASSERT_EQUAL(TAPER_RESULT_IDENTIFIER, tell(&two, "ON-BUS-1"));
-    TEST_ASSERT_EQUAL_UINT8(2, connector);
+    TEST_ASSERT_EQUAL_UINT8(2, content.connector);
     bench_answered(&two, TAPER_ANSWER_ACCEPTED);
     assert_identifier(0, "ON-BUS-0");
     assert_identifier(2, "ON-BUS-1");
@@ -189,12 +187,11 @@ static void test_stray_frames_do_not_take_the_link(void) {
     const uint8_t kinds[] = {0x20, 0x30, 0x40, 0xFF};
     for (unsigned k = 0; k < sizeof kinds; k++) {
         frame.data[0] = kinds[k];
-        TEST_ASSERT_EQUAL(TAPER_RESULT_NONE,
-                          taper_transfers_take(&transfers, &frame, &scene, &curve, &connector));
+        TEST_ASSERT_EQUAL(TAPER_RESULT_NONE, taper_transfers_take(&transfers, &frame, &scene, &content));
     }
     frame.length = 0;
     frame.data[0] = 0x01;
-    (void)taper_transfers_take(&transfers, &frame, &scene, &curve, &connector);
+    (void)taper_transfers_take(&transfers, &frame, &scene, &content);
     assert_link_free();
 }
 

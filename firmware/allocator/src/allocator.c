@@ -3,14 +3,17 @@
 #include <string.h>
 
 #include "rooms.h"
+#include "turns.h"
 
 /** Everything one allocation needs, so that the helpers below take one argument. */
 typedef struct {
     const taper_station_config_t *config;
     const taper_snapshot_t *snapshot;
     const taper_proposal_t *proposal;
-    const taper_allocator_t *allocator; /* the switches' history */
+    taper_weights_t weights[TAPER_MAX_CONNECTORS];
     taper_rooms_t rooms;
+    bool keeps;         /* `kept` is what others leave for one who has waited too long already */
+    taper_rooms_t kept; /* until then: the rooms before anybody had anything */
     int32_t *current_mA;
 } round_t;
 
@@ -21,106 +24,134 @@ void taper_allocator_init(taper_allocator_t *allocator) {
 /** Rooms less what connectors that cannot be told anything may still draw. */
 static void open_rooms(round_t *round, const taper_supply_t *supply, const int32_t *reserved_mA) {
     taper_rooms_open(&round->rooms, round->config, supply);
-    for (uint8_t i = 0; reserved_mA != NULL && i < round->config->connector_count; i++) {
+    for (uint8_t i = 0; i < round->config->connector_count; i++) {
         const taper_booking_t booking = taper_booking_now(round->config, round->snapshot, i);
-        taper_rooms_take(&round->rooms, round->config, i, &booking, reserved_mA[i]);
+        round->weights[i] = taper_rooms_weigh(&round->rooms, &booking);
+        if (reserved_mA != NULL && reserved_mA[i] != 0) {
+            taper_rooms_draw(&round->rooms, round->config, i, &round->weights[i], reserved_mA[i]);
+        }
     }
+    round->keeps = false;
+    round->kept = round->rooms;
 }
 
 /** Current that `power_W` needs, rounded down. 1 mA carries W_per_A mW. */
-static int32_t current_of_mA(const taper_demand_t *demand, int64_t power_mW) {
-    return taper_saturate_i32(power_mW / demand->W_per_A);
+static int32_t current_of_mA(const taper_demand_t *demand, int32_t power_W) {
+    return taper_saturate_i32((int64_t)taper_max_i32(power_W, 0) * 1000 / demand->W_per_A);
 }
 
 static int32_t whole_steps(int32_t current_mA) {
     return current_mA - current_mA % TAPER_CURRENT_STEP_mA;
 }
 
-/** Raise a connector towards `target_mA` as far as every room allows; below its minimum not at all. */
-static void raise(round_t *round, uint8_t i, int32_t target_mA) {
-    const taper_demand_t *demand = &round->snapshot->demand[i];
-    const int32_t present_mA = round->current_mA[i];
-    const int32_t most_mA = taper_min_i32(target_mA, demand->max_mA);
-    if (most_mA <= present_mA) {
-        return;
+/* ---- Minima, by turns */
+
+static bool fits(const round_t *round, const taper_rooms_t *rooms, uint8_t i, int32_t current_mA) {
+    return taper_rooms_fit_mA(rooms, round->config, i, &round->weights[i], current_mA) >= current_mA;
+}
+
+static void draw(round_t *round, taper_rooms_t *rooms, uint8_t i, int32_t current_mA) {
+    taper_rooms_draw(rooms, round->config, i, &round->weights[i], current_mA);
+}
+
+/** Keep room for one who waited too long from those who would be switched on meanwhile; not for what never fits. */
+static void keep_room_for(round_t *round, uint8_t i, int32_t least_mA) {
+    if (!round->keeps && fits(round, &round->kept, i, least_mA)) {
+        round->keeps = true;
+        round->kept = round->rooms;
+        draw(round, &round->kept, i, least_mA);
     }
-    const taper_booking_t booking = taper_booking_now(round->config, round->snapshot, i);
-    const int32_t fits_mA = taper_max_i32(taper_rooms_left_mA(&round->rooms, round->config, i, &booking), 0);
-    const int32_t raised_mA = whole_steps(present_mA + taper_min_i32(most_mA - present_mA, fits_mA));
-    if (raised_mA <= present_mA || raised_mA < demand->min_mA) {
-        return;
+}
+
+static void serve_minimum(round_t *round, const taper_candidate_t *candidate, bool is_on) {
+    const uint8_t i = candidate->connector;
+    const int32_t least_mA = taper_turns_least_mA(&round->snapshot->demand[i]);
+    const bool may = is_on || !round->keeps || fits(round, &round->kept, i, least_mA);
+    if (may && fits(round, &round->rooms, i, least_mA)) {
+        draw(round, &round->rooms, i, least_mA);
+        if (round->keeps) {
+            draw(round, &round->kept, i, least_mA);
+        }
+        round->current_mA[i] = least_mA;
+    } else if (candidate->stage == TAPER_STAGE_OVERDUE) {
+        keep_room_for(round, i, least_mA);
     }
-    taper_rooms_take(&round->rooms, round->config, i, &booking, raised_mA - present_mA);
-    round->current_mA[i] = raised_mA;
 }
 
-/** A switch that belongs to another session has no history. */
-static const taper_turn_t *switch_of(const round_t *round, uint8_t i) {
-    static const taper_turn_t fresh = {0};
-    const taper_turn_t *state = &round->allocator->turn[i];
-    return state->session == round->snapshot->demand[i].session ? state : &fresh;
+/** The queue's minima from place `first` to before `end`. */
+static void serve_minima(round_t *round, const taper_allocator_t *allocator, const taper_queue_t *queue,
+                         uint8_t first, uint8_t end) {
+    for (uint8_t place = first; place < end; place++) {
+        const taper_candidate_t *candidate = &queue->candidate[place];
+        if (candidate->stage != TAPER_STAGE_KEPT_OFF) {
+            serve_minimum(round, candidate, allocator->turn[candidate->connector].on);
+        }
+    }
 }
 
-static bool held(const taper_turn_t *state, bool on, uint32_t now_ms, uint32_t least_ms) {
-    return state->switched && state->on == on && taper_elapsed_ms(now_ms, state->since_ms) < least_ms;
-}
+/* ---- What goes beyond them, by rank */
 
-/** Current to start from for a wish: with a minimum, a wish below it becomes the minimum or nothing. */
 static int32_t wished_mA(const round_t *round, uint8_t i) {
-    const taper_demand_t *demand = &round->snapshot->demand[i];
-    const int32_t wish_mA =
-        current_of_mA(demand, (int64_t)taper_max_i32(round->proposal->wish_W[i], 0) * 1000);
-    if (wish_mA >= demand->min_mA) {
-        return wish_mA;
-    }
-    const bool stays_on = held(switch_of(round, i), true, round->snapshot->now_ms, round->config->min_on_ms);
-    return stays_on || wish_mA >= demand->min_mA / 2 ? demand->min_mA : 0;
+    return current_of_mA(&round->snapshot->demand[i], round->proposal->wish_W[i]);
 }
 
-/** Current for a ceiling, rounded down, but at least the minimum: less than that cannot be offered. */
+static int32_t ceiling_W(const round_t *round, uint8_t i) {
+    return taper_max_i32(round->proposal->ceiling_W[i], round->proposal->wish_W[i]);
+}
+
 static int32_t ceiling_mA(const round_t *round, uint8_t i) {
     const taper_demand_t *demand = &round->snapshot->demand[i];
-    const int32_t ceiling_W = taper_max_i32(round->proposal->ceiling_W[i], round->proposal->wish_W[i]);
-    if (ceiling_W <= 0) {
-        return 0;
-    }
-    const int32_t useful_mA = taper_min_i32(current_of_mA(demand, (int64_t)ceiling_W * 1000), demand->max_mA);
-    return taper_max_i32(whole_steps(useful_mA), demand->min_mA);
+    return whole_steps(taper_min_i32(current_of_mA(demand, ceiling_W(round, i)), demand->max_mA));
 }
 
 /** The same rounded up: the last step carries the part of the ceiling that rounding down left out. */
 static int32_t ceiling_rounded_up_mA(const round_t *round, uint8_t i) {
-    const taper_demand_t *demand = &round->snapshot->demand[i];
     const int32_t whole_mA = ceiling_mA(round, i);
-    const int64_t ceiling_mW =
-        (int64_t)taper_max_i32(round->proposal->ceiling_W[i], round->proposal->wish_W[i]) * 1000;
-    return (int64_t)whole_mA * demand->W_per_A < ceiling_mW ? whole_mA + TAPER_CURRENT_STEP_mA : whole_mA;
+    const int64_t whole_mW = (int64_t)whole_mA * round->snapshot->demand[i].W_per_A;
+    return whole_mW < (int64_t)ceiling_W(round, i) * 1000 ? whole_mA + TAPER_CURRENT_STEP_mA : whole_mA;
 }
 
-static bool may_have_current(const round_t *round, uint8_t i) {
-    if (i >= round->snapshot->count || !round->snapshot->demand[i].active) {
-        return false;
+/** Raise a connector towards `target_mA` as far as every room allows. */
+static void raise(round_t *round, uint8_t i, int32_t target_mA) {
+    const int32_t present_mA = round->current_mA[i];
+    const int32_t more_mA = taper_min_i32(target_mA, round->snapshot->demand[i].max_mA) - present_mA;
+    if (more_mA < TAPER_CURRENT_STEP_mA) {
+        return;
     }
-    const bool kept_off =
-        held(switch_of(round, i), false, round->snapshot->now_ms, round->config->min_off_ms);
-    return round->snapshot->demand[i].min_mA == 0 || !kept_off;
+    const int32_t fits_mA = taper_rooms_fit_mA(&round->rooms, round->config, i, &round->weights[i], more_mA);
+    const int32_t raised_mA = whole_steps(taper_max_i32(fits_mA, 0));
+    draw(round, &round->rooms, i, raised_mA);
+    round->current_mA[i] = present_mA + raised_mA;
 }
 
-static void note_switch(taper_turn_t *state, const taper_demand_t *demand, bool on, uint32_t now_ms) {
-    if (!demand->active || state->session != demand->session) {
-        *state = (taper_turn_t){.session = demand->active ? demand->session : 0};
-    }
-    if (state->on != on) {
-        *state = (taper_turn_t){.on = on, .switched = true, .session = state->session, .since_ms = now_ms};
-    }
+/** Whether it has its minimum, or needs none. A rank binds nobody: it may name a connector that there is not. */
+static bool may_be_raised(const round_t *round, uint8_t i) {
+    return i < round->snapshot->count && round->snapshot->demand[i].active &&
+           (round->snapshot->demand[i].min_mA == 0 || round->current_mA[i] > 0);
 }
 
-/** One pass in the order of rank: raise every connector that may have current towards `target`. */
+/** One pass in the order of rank: raise every connector that may have more towards `target`. */
 static void raise_all(round_t *round, int32_t (*target)(const round_t *, uint8_t)) {
     for (uint8_t place = 0; place < round->snapshot->count; place++) {
         const uint8_t i = round->proposal->rank[place];
-        if (may_have_current(round, i)) {
+        if (may_be_raised(round, i)) {
             raise(round, i, target(round, i));
+        }
+    }
+}
+
+/** Who is to be cut last when phases are balanced: the queue, as it stands; then those that need no turn, by rank. */
+static void order_for_balance(const round_t *round, const taper_queue_t *queue, uint8_t *order) {
+    uint8_t count = 0;
+    memset(order, UINT8_MAX, round->snapshot->count);
+    while (count < queue->count) {
+        order[count] = queue->candidate[count].connector;
+        count++;
+    }
+    for (uint8_t place = 0; place < round->snapshot->count && count < round->snapshot->count; place++) {
+        const uint8_t i = round->proposal->rank[place];
+        if (i < round->snapshot->count && round->snapshot->demand[i].min_mA == 0) {
+            order[count++] = i;
         }
     }
 }
@@ -128,20 +159,23 @@ static void raise_all(round_t *round, int32_t (*target)(const round_t *, uint8_t
 void taper_allocate(taper_allocator_t *allocator, const taper_station_config_t *config,
                     const taper_snapshot_t *snapshot, const taper_proposal_t *proposal,
                     const taper_supply_t *supply, const int32_t *reserved_mA, taper_setpoints_t *setpoints) {
-    round_t round = {
-        .config = config,
-        .snapshot = snapshot,
-        .proposal = proposal,
-        .allocator = allocator,
-        .current_mA = setpoints->current_mA,
-    };
+    taper_queue_t queue;
+    uint8_t order[TAPER_MAX_CONNECTORS];
+    round_t round;
+    round.config = config;
+    round.snapshot = snapshot;
+    round.proposal = proposal;
+    round.current_mA = setpoints->current_mA;
     memset(setpoints, 0, sizeof *setpoints);
     open_rooms(&round, supply, reserved_mA);
+    taper_turns_begin(allocator, config, snapshot);
+    taper_turns_line_up(allocator, config, snapshot, proposal, &queue);
+    serve_minima(&round, allocator, &queue, 0, queue.wishing);
     raise_all(&round, wished_mA);
+    serve_minima(&round, allocator, &queue, queue.wishing, queue.count);
     raise_all(&round, ceiling_mA);
     raise_all(&round, ceiling_rounded_up_mA);
-    for (uint8_t i = 0; i < snapshot->count; i++) {
-        note_switch(&allocator->turn[i], &snapshot->demand[i], setpoints->current_mA[i] > 0,
-                    snapshot->now_ms);
-    }
+    order_for_balance(&round, &queue, order);
+    taper_balance(config, snapshot, order, setpoints);
+    taper_turns_end(allocator, config, snapshot, proposal, &queue, setpoints);
 }

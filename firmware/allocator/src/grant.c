@@ -1,6 +1,22 @@
 /* Break before make: an increase waits for the proof of the decreases that pay for it. */
 #include "rooms.h"
+#include "taper/allocator.h"
 #include "taper/ledger.h"
+
+/**
+ * The current of a delta line is bounded by two rows together, and a connector may be in one of them only. What the other one
+ * is overdrawn by leaves it no room either: the current would rise, though no row did.
+ */
+static void share_excess(taper_rooms_t *rooms, uint8_t k) {
+    for (unsigned line = 0; line < 3; line++) {
+        int64_t *first = &rooms->room[k][TAPER_ROW_DELTA_L1 + line];
+        int64_t *second = &rooms->room[k][TAPER_ROW_DELTA_L1_B + line];
+        const int64_t least = *first < *second ? *first : *second;
+        if (least < 0) {
+            *first = *second = least;
+        }
+    }
+}
 
 /** What is left when every connector draws what it may. A room can be negative: the limit fell. */
 static void open_rooms_left(taper_rooms_t *rooms, const taper_ledger_t *ledger,
@@ -11,6 +27,9 @@ static void open_rooms_left(taper_rooms_t *rooms, const taper_ledger_t *ledger,
         const taper_booking_t booking = taper_booking_now(config, snapshot, i);
         taper_rooms_take(rooms, config, i, &booking, taper_ledger_may_mA(ledger, i));
     }
+    for (uint8_t k = 0; k < config->group_count; k++) {
+        share_excess(rooms, k);
+    }
 }
 
 /** At least the minimum current, or nothing. */
@@ -18,30 +37,26 @@ static int32_t whole_or_none_mA(const taper_snapshot_t *snapshot, uint8_t i, int
     return current_mA < snapshot->demand[i].min_mA ? 0 : current_mA - current_mA % TAPER_CURRENT_STEP_mA;
 }
 
-/** The most up to `target_mA` that fits; what it was told already if nothing does or too little for its minimum. */
-static int32_t raised_mA(const taper_rooms_t *rooms, const taper_ledger_t *ledger,
-                         const taper_station_config_t *config, const taper_snapshot_t *snapshot, uint8_t i,
-                         int32_t target_mA) {
-    const int32_t told_mA = taper_ledger_told_mA(ledger, i);
-    const taper_booking_t booking = taper_booking_now(config, snapshot, i);
-    const int32_t fits_mA = taper_rooms_left_mA(rooms, config, i, &booking);
-    if (fits_mA < 0) {
-        return told_mA;
-    }
-    const int64_t most_mA = (int64_t)taper_ledger_may_mA(ledger, i) + fits_mA;
-    const int32_t current_mA =
-        whole_or_none_mA(snapshot, i, taper_min_i32(target_mA, taper_saturate_i32(most_mA)));
-    return taper_max_i32(current_mA, told_mA);
+/** What needs no room, whatever others draw: no more than it was told last, and may still draw by that. */
+static int32_t kept_mA(const taper_ledger_t *ledger, const taper_snapshot_t *snapshot, uint8_t i,
+                       int32_t target_mA) {
+    const int32_t last_mA = taper_min_i32(ledger->entry[i].last_mA, taper_ledger_told_mA(ledger, i));
+    return whole_or_none_mA(snapshot, i, taper_min_i32(target_mA, last_mA));
 }
 
+/** The most up to `target_mA` that fits. Nothing does below a row that is overdrawn. */
 static void raise_one(taper_rooms_t *rooms, const taper_ledger_t *ledger,
                       const taper_station_config_t *config, const taper_snapshot_t *snapshot, uint8_t i,
                       int32_t target_mA, int32_t *granted_mA) {
-    const int32_t more_mA = raised_mA(rooms, ledger, config, snapshot, i, target_mA);
-    const int32_t taken_mA = taper_max_i32(more_mA - taper_ledger_may_mA(ledger, i), 0);
     const taper_booking_t booking = taper_booking_now(config, snapshot, i);
-    taper_rooms_take(rooms, config, i, &booking, taken_mA);
-    *granted_mA = whole_or_none_mA(snapshot, i, more_mA);
+    const int32_t may_mA = taper_ledger_may_mA(ledger, i);
+    const int32_t fits_mA = taper_rooms_left_mA(rooms, config, i, &booking);
+    const int32_t most_mA = taper_saturate_i32((int64_t)may_mA + fits_mA);
+    const int32_t raised_mA = whole_or_none_mA(snapshot, i, taper_min_i32(target_mA, most_mA));
+    if (fits_mA >= 0 && raised_mA > *granted_mA) {
+        taper_rooms_take(rooms, config, i, &booking, taper_max_i32(raised_mA - may_mA, 0));
+        *granted_mA = raised_mA;
+    }
 }
 
 void taper_ledger_grant(const taper_ledger_t *ledger, const taper_station_config_t *config,
@@ -50,13 +65,12 @@ void taper_ledger_grant(const taper_ledger_t *ledger, const taper_station_config
     taper_rooms_t rooms;
     open_rooms_left(&rooms, ledger, config, snapshot, supply);
     for (uint8_t i = 0; i < config->connector_count; i++) {
-        const int32_t told_mA = taper_ledger_told_mA(ledger, i);
-        granted->current_mA[i] = whole_or_none_mA(snapshot, i, taper_min_i32(target->current_mA[i], told_mA));
+        granted->current_mA[i] = kept_mA(ledger, snapshot, i, target->current_mA[i]);
     }
     for (uint8_t place = 0; place < config->connector_count; place++) {
         const uint8_t i = rank[place];
         /* A rank binds nobody: it may name a connector twice, or one that there is not. */
-        if (i < config->connector_count && target->current_mA[i] > granted->current_mA[i]) {
+        if (i < config->connector_count) {
             raise_one(&rooms, ledger, config, snapshot, i, target->current_mA[i], &granted->current_mA[i]);
         }
     }

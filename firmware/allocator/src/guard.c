@@ -1,6 +1,15 @@
 /* The last gate. It shares no code with the allocator on purpose: one mistake must not blind both. */
 #include "taper/allocator.h"
-#include "taper/ledger.h"
+
+/** Beyond 100 kA squares do not fit 64 bits, nor is there such a limit [0.1 mA]. */
+#define MOST_uA100 INT64_C(1000000000)
+
+/** What flows into a group. */
+typedef struct {
+    int64_t power_mW;
+    int64_t line_uA[3]; /* to neutral, or of three phases, or of a wiring that is not known: L1, L2, L3 */
+    int64_t pair_uA[3]; /* between two lines: L1-L2, L2-L3, L3-L1 */
+} load_t;
 
 static bool connector_passes(const taper_connector_config_t *connector, const taper_demand_t *demand,
                              int32_t current_mA) {
@@ -12,68 +21,146 @@ static bool connector_passes(const taper_connector_config_t *connector, const ta
            current_mA % TAPER_CURRENT_STEP_mA == 0;
 }
 
+static int64_t quotient_up(int64_t dividend, int64_t divisor) {
+    return (dividend + divisor - 1) / divisor;
+}
+
+/** Lines of a connector by its description, bit 0 L1 .. bit 2 L3. */
+static uint8_t lines_of(const taper_connector_config_t *connector) {
+    static const uint8_t first[] = {1, 1, 2, 4, 1, 2, 4};     /* by taper_rotation_t: line of conductor L1 */
+    static const uint8_t first_two[] = {3, 3, 6, 5, 5, 3, 6}; /* of L1 and L2 */
+    const uint8_t rotation = connector->rotation < sizeof first ? connector->rotation : 0;
+    if (connector->is_dc || (connector->phases > 1 && !connector->line_to_line)) {
+        return 7;
+    }
+    return connector->line_to_line ? first_two[rotation] : first[rotation];
+}
+
+/** How a connector draws, by the snapshot, or else by its description. */
+static taper_booking_t booking_of(const taper_station_config_t *config, const taper_demand_t *demand,
+                                  uint8_t i) {
+    const taper_connector_config_t *connector = &config->connectors[i];
+    if (demand->booking.phases != 0) {
+        return demand->booking;
+    }
+    taper_booking_t booking = {
+        .W_per_A = taper_max_i32(demand->W_per_A, demand->booking.W_per_A),
+        .permille = 1000,
+        .phases = lines_of(connector),
+        .line_to_line = connector->line_to_line && !connector->is_dc,
+    };
+    if (connector->is_dc) { /* all of its power, over three phases */
+        const int64_t W_per_A =
+            quotient_up(quotient_up(connector->voltage_mV, 1000) * 1000, connector->efficiency_permille);
+        booking.permille = (int32_t)quotient_up(W_per_A * 1000000, INT64_C(3) * config->site_voltage_mV);
+    }
+    return booking;
+}
+
+/** Add a connector's current to the lines or to the pair that it flows in. */
+static void add_current(load_t *load, const taper_booking_t *booking, int32_t current_mA) {
+    const int64_t current_uA = (int64_t)current_mA * booking->permille;
+    load->power_mW += (int64_t)current_mA * booking->W_per_A;
+    for (unsigned line = 0; line < 3; line++) {
+        const unsigned pair = 1u << line | 1u << (line + 1) % 3;
+        if (booking->line_to_line && booking->phases == pair) {
+            load->pair_uA[line] += current_uA;
+            return;
+        }
+    }
+    for (unsigned line = 0; line < 3; line++) {
+        load->line_uA[line] += (booking->phases >> line & 1u) != 0u ? current_uA : 0;
+    }
+}
+
+static void add_load(load_t *sum, const load_t *load) {
+    sum->power_mW += load->power_mW;
+    for (unsigned line = 0; line < 3; line++) {
+        sum->line_uA[line] += load->line_uA[line];
+        sum->pair_uA[line] += load->pair_uA[line];
+    }
+}
+
+/** Of a limit, what a current in one line leaves [0.1 mA]; negative: less than nothing. */
+static int64_t left_uA100(int32_t limit_mA, int64_t other_uA) {
+    const int64_t left_uA = (int64_t)limit_mA * 1000 - other_uA;
+    const int64_t left = left_uA < 0 ? -1 : left_uA / 100;
+    return left < MOST_uA100 ? left : MOST_uA100;
+}
+
+/** A line carries the currents x and y of two pairs, which differ by 60 degrees: |I|^2 = x^2 + x y + y^2. */
+static bool line_passes(const load_t *load, unsigned line, int32_t limit_mA) {
+    const int64_t left = left_uA100(limit_mA, load->line_uA[line]);
+    const int64_t x = quotient_up(load->pair_uA[line], 100);
+    const int64_t y = quotient_up(load->pair_uA[(line + 2) % 3], 100);
+    return x <= left && y <= left && x * x + x * y + y * y <= left * left;
+}
+
+/**
+ * Line a of a delta side carries AB + BC - 2 CA: |I|^2 = (AB^2 - AB BC + BC^2) + 2 CA (AB + BC) + 4 CA^2, and the windings a
+ * and c, that is what flows from the lines a and c to neutral.
+ */
+static bool delta_passes(const load_t *load, unsigned line, int32_t limit_mA) {
+    const int64_t left = left_uA100(limit_mA, load->line_uA[line] + load->line_uA[(line + 2) % 3]);
+    const int64_t ab = quotient_up(load->pair_uA[line], 100);
+    const int64_t bc = quotient_up(load->pair_uA[(line + 1) % 3], 100);
+    const int64_t ca = quotient_up(load->pair_uA[(line + 2) % 3], 100);
+    return ab <= left && bc <= left && 2 * ca <= left &&
+           ab * ab - ab * bc + bc * bc + 2 * ca * (ab + bc) + 4 * ca * ca <= left * left;
+}
+
+/** Current on a line as it counts for imbalance: pairs count on both of their lines. */
+static int64_t setpoints_uA(const load_t *load, unsigned line) {
+    return load->line_uA[line] + load->pair_uA[line] + load->pair_uA[(line + 2) % 3];
+}
+
+static bool balance_passes(const load_t *load, int32_t limit_mA) {
+    for (unsigned line = 0; line < 3; line++) {
+        const int64_t more_uA = setpoints_uA(load, line) - setpoints_uA(load, (line + 1) % 3);
+        const int64_t limit_uA = (int64_t)limit_mA * 1000;
+        if (more_uA > limit_uA || more_uA < -limit_uA) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/** Whether a group's load is within its own limits; `phase_mA`: of now, on each line. */
+static bool load_passes(const taper_group_config_t *group, const load_t *load, const int32_t *phase_mA) {
+    for (unsigned line = 0; line < 3; line++) {
+        const int32_t limit_mA = taper_max_i32(taper_min_i32(group->limit_mA, phase_mA[line]), 0);
+        if (group->limit_mA != 0 && !line_passes(load, line, limit_mA)) {
+            return false;
+        }
+        if (group->delta_mA != 0 && !delta_passes(load, line, group->delta_mA)) {
+            return false;
+        }
+    }
+    return (group->limit_W == 0 || load->power_mW <= (int64_t)group->limit_W * 1000) &&
+           (group->imbalance_mA == 0 || balance_passes(load, group->imbalance_mA));
+}
+
 bool taper_guard_passes(const taper_station_config_t *config, const taper_snapshot_t *snapshot,
                         const taper_supply_t *supply, const taper_setpoints_t *setpoints) {
-    int64_t sum_mW[TAPER_MAX_GROUPS] = {0};
+    static const int32_t as_described[3] = {INT32_MAX, INT32_MAX, INT32_MAX};
+    load_t load[TAPER_MAX_GROUPS] = {0};
     for (uint8_t i = 0; i < config->connector_count; i++) {
         const int32_t current_mA = setpoints->current_mA[i];
         if (!connector_passes(&config->connectors[i], &snapshot->demand[i], current_mA)) {
             return false;
         }
         if (current_mA > 0) {
-            sum_mW[config->connectors[i].group] +=
-                (int64_t)current_mA *
-                taper_max_i32(snapshot->demand[i].booking.W_per_A, snapshot->demand[i].W_per_A);
+            const taper_booking_t booking = booking_of(config, &snapshot->demand[i], i);
+            add_current(&load[config->connectors[i].group], &booking, current_mA);
         }
     }
     for (uint8_t k = config->group_count; k-- > 0;) { /* children stand behind their parents */
-        const int64_t limit_mW = (int64_t)config->groups[k].limit_W * 1000;
-        if (sum_mW[k] > limit_mW ||
-            (k == 0 && sum_mW[k] > (int64_t)taper_max_i32(supply->site_W, 0) * 1000)) {
+        if (!load_passes(&config->groups[k], &load[k], k == 0 ? supply->phase_mA : as_described)) {
             return false;
         }
         if (k > 0) {
-            sum_mW[config->groups[k].parent] += sum_mW[k];
+            add_load(&load[config->groups[k].parent], &load[k]);
         }
     }
-    return true;
-}
-
-/** Sums per group of `current_mA`, a child's in its parent's. */
-static void sum_groups(const taper_station_config_t *config, const taper_snapshot_t *snapshot,
-                       const int32_t *current_mA, int64_t *sum_mW) {
-    for (uint8_t i = 0; i < config->connector_count; i++) {
-        const taper_connector_config_t *connector = &config->connectors[i];
-        const int32_t nominal_W_per_A = (connector->voltage_mV + 999) / 1000 * connector->phases;
-        const taper_demand_t *demand = &snapshot->demand[i];
-        const int32_t W_per_A = demand->active ? taper_max_i32(demand->booking.W_per_A, demand->W_per_A)
-                                               : taper_max_i32(demand->booking.W_per_A, nominal_W_per_A);
-        sum_mW[connector->group] += (int64_t)current_mA[i] * W_per_A;
-    }
-    for (uint8_t k = config->group_count; k-- > 1;) {
-        sum_mW[config->groups[k].parent] += sum_mW[k];
-    }
-}
-
-bool taper_guard_hand_over_passes(const taper_ledger_t *ledger, const taper_station_config_t *config,
-                                  const taper_snapshot_t *snapshot, const taper_supply_t *supply,
-                                  const taper_setpoints_t *granted) {
-    int32_t before_mA[TAPER_MAX_CONNECTORS];
-    int32_t after_mA[TAPER_MAX_CONNECTORS];
-    int64_t before_mW[TAPER_MAX_GROUPS] = {0};
-    int64_t after_mW[TAPER_MAX_GROUPS] = {0};
-    for (uint8_t i = 0; i < config->connector_count; i++) {
-        before_mA[i] = taper_ledger_may_mA(ledger, i);
-        after_mA[i] = taper_max_i32(before_mA[i], granted->current_mA[i]);
-    }
-    sum_groups(config, snapshot, before_mA, before_mW);
-    sum_groups(config, snapshot, after_mA, after_mW);
-    for (uint8_t k = 0; k < config->group_count; k++) {
-        const int32_t limit_W =
-            k == 0 ? taper_min_i32(config->groups[0].limit_W, supply->site_W) : config->groups[k].limit_W;
-        if (after_mW[k] > (int64_t)taper_max_i32(limit_W, 0) * 1000 && after_mW[k] > before_mW[k]) {
-            return false;
-        }
-    }
-    return true;
+    return load[0].power_mW <= (int64_t)taper_max_i32(supply->site_W, 0) * 1000;
 }

@@ -2,8 +2,18 @@
 
 #include <string.h>
 
+#include "taper/draw.h"
+
 /** A report tells nothing of setpoints that may have crossed it on the way: both may have waited as long [ms]. */
 #define CROSSING_ms (2u * TAPER_LEDGER_LATE_ms)
+/** taper_ledger_entry_t.first_echo: nothing of an earlier life can be echoed any more. */
+#define ECHO_IS_OURS UINT8_MAX
+
+/** In which a vehicle follows a lower setpoint, in the time of the bus. */
+static uint32_t reaction_ms(const taper_ledger_t *ledger, uint8_t connector) {
+    const uint32_t world_ms = ledger->config->connectors[connector].reaction_ms;
+    return world_ms / ledger->time_scale + (world_ms % ledger->time_scale == 0 ? 0 : 1);
+}
 
 void taper_ledger_init(taper_ledger_t *ledger, const taper_station_config_t *config, uint32_t validity_ms,
                        uint32_t time_scale, uint32_t now_ms) {
@@ -12,21 +22,28 @@ void taper_ledger_init(taper_ledger_t *ledger, const taper_station_config_t *con
     ledger->validity_ms = validity_ms;
     ledger->time_scale = time_scale;
     for (uint8_t i = 0; i < config->connector_count; i++) {
-        ledger->entry[i].unknown_mA = config->connectors[i].max_mA;
-        ledger->entry[i].unknown_until_ms = now_ms + validity_ms;
+        taper_ledger_entry_t *entry = &ledger->entry[i];
+        entry->over_fallback_mA = config->connectors[i].fallback_mA;
+        entry->unknown_mA = config->connectors[i].max_mA;
+        /* its validity, and what its last report may wait */
+        entry->unknown_until_ms = now_ms + validity_ms + TAPER_LEDGER_LATE_ms + reaction_ms(ledger, i);
     }
 }
 
-static bool is_open(const taper_ledger_entry_t *entry, unsigned counter) {
-    return ((unsigned)entry->open >> counter & 1u) != 0u;
+static bool has_bit(uint16_t set, unsigned counter) {
+    return ((unsigned)set >> counter & 1u) != 0u;
 }
 
-static void close_one(taper_ledger_entry_t *entry, unsigned counter) {
-    entry->open = (uint16_t)(entry->open & ~(1u << counter));
+static void clear_bit(uint16_t *set, unsigned counter) {
+    *set = (uint16_t)(*set & ~(1u << counter));
+}
+
+static void set_bit(uint16_t *set, unsigned counter) {
+    *set = (uint16_t)(*set | 1u << counter);
 }
 
 bool taper_ledger_can_send(const taper_ledger_t *ledger, uint8_t connector, uint8_t counter) {
-    return !is_open(&ledger->entry[connector], counter);
+    return !has_bit(ledger->entry[connector].echoed, counter);
 }
 
 void taper_ledger_sent(taper_ledger_t *ledger, uint8_t connector, uint8_t counter, int32_t current_mA,
@@ -35,21 +52,101 @@ void taper_ledger_sent(taper_ledger_t *ledger, uint8_t connector, uint8_t counte
     entry->sent_dA[counter] = (uint16_t)(current_mA / TAPER_CURRENT_STEP_mA);
     entry->fallback_dA[counter] = (uint16_t)(fallback_mA / TAPER_CURRENT_STEP_mA);
     entry->sent_ms[counter] = now_ms;
-    entry->open = (uint16_t)(entry->open | 1u << counter);
+    entry->last_mA = current_mA;
+    entry->last_fallback_mA = fallback_mA;
+    set_bit(&entry->open, counter);
+    set_bit(&entry->echoed, counter);
 }
 
-/** Close all that was sent at least `margin_ms` before `time_ms`. */
-static void close_older(taper_ledger_entry_t *entry, uint32_t time_ms, uint32_t margin_ms) {
+/** The greatest of those in steps of the wire that are open. */
+static int32_t most_open_mA(const taper_ledger_entry_t *entry, const uint16_t *steps_dA) {
+    int32_t most_dA = 0;
     for (unsigned c = 0; c < TAPER_LEDGER_SETPOINTS; c++) {
-        if (is_open(entry, c) && taper_time_reached(time_ms, entry->sent_ms[c] + margin_ms)) {
-            close_one(entry, c);
+        if (has_bit(entry->open, c)) {
+            most_dA = taper_max_i32(most_dA, steps_dA[c]);
         }
+    }
+    return most_dA * TAPER_CURRENT_STEP_mA;
+}
+
+/** What the connector may let through by our setpoints. One in force is never below its own fallback current. */
+static int32_t in_force_mA(const taper_ledger_entry_t *entry) {
+    return taper_max_i32(most_open_mA(entry, entry->sent_dA), entry->over_fallback_mA);
+}
+
+static unsigned count_fades(const taper_ledger_entry_t *entry) {
+    unsigned count = 0;
+    while (count < TAPER_LEDGER_FADES && entry->fade[count].mA != 0) {
+        count++;
+    }
+    return count;
+}
+
+/** Book a level until a time that is not before any that is booked, or taken for the last of these. */
+static void fade_from(taper_ledger_entry_t *entry, int32_t level_mA, uint32_t until_ms) {
+    unsigned count = count_fades(entry);
+    if (count > 0 && !taper_time_reached(until_ms, entry->fade[count - 1].until_ms)) {
+        until_ms = entry->fade[count - 1].until_ms;
+    }
+    while (count > 0 && entry->fade[count - 1].mA <= level_mA) {
+        entry->fade[--count].mA = 0; /* lasts no longer, and is no higher */
+    }
+    if (count == TAPER_LEDGER_FADES) {
+        entry->fade[count - 1].until_ms = until_ms;
+    } else {
+        entry->fade[count] = (taper_ledger_fade_t){.mA = level_mA, .until_ms = until_ms};
     }
 }
 
-static void close_all(taper_ledger_entry_t *entry) {
-    entry->open = 0;
-    entry->unknown_mA = 0;
+/** After some setpoints were closed at `time_ms`: the vehicle follows. */
+static void follow_down(const taper_ledger_t *ledger, uint8_t connector, taper_ledger_entry_t *entry,
+                        int32_t before_mA, uint32_t time_ms) {
+    if (in_force_mA(entry) < before_mA) {
+        fade_from(entry, before_mA, time_ms + reaction_ms(ledger, connector));
+    }
+}
+
+static void drop_faded(taper_ledger_entry_t *entry, uint32_t time_ms) {
+    unsigned gone = 0;
+    const unsigned count = count_fades(entry);
+    while (gone < count && taper_time_reached(time_ms, entry->fade[gone].until_ms)) {
+        gone++;
+    }
+    memmove(entry->fade, entry->fade + gone, (count - gone) * sizeof entry->fade[0]);
+    for (unsigned k = count - gone; k < count; k++) {
+        entry->fade[k].mA = 0;
+    }
+}
+
+static void drop_unknown(taper_ledger_entry_t *entry, uint32_t time_ms) {
+    if (entry->unknown_mA != 0 && taper_time_reached(time_ms, entry->unknown_until_ms)) {
+        entry->unknown_mA = 0;
+    }
+}
+
+/** Nothing of an earlier life is in force any more; the vehicle has followed by then. */
+static void end_unknown(taper_ledger_entry_t *entry, uint32_t followed_ms) {
+    if (!taper_time_reached(followed_ms, entry->unknown_until_ms)) {
+        entry->unknown_until_ms = followed_ms;
+    }
+    entry->first_echo = ECHO_IS_OURS;
+}
+
+/** Over, but the fallback current told with it may be the last one that was accepted. */
+static void close_unheard(taper_ledger_entry_t *entry, unsigned c) {
+    clear_bit(&entry->open, c);
+    entry->over_fallback_mA =
+        taper_max_i32(entry->over_fallback_mA, entry->fallback_dA[c] * TAPER_CURRENT_STEP_mA);
+}
+
+/** The connector fell back, so all that had arrived when it said so is over. */
+static void hear_fallback(taper_ledger_entry_t *entry, uint32_t at_ms) {
+    for (unsigned c = 0; c < TAPER_LEDGER_SETPOINTS; c++) {
+        if (has_bit(entry->open, c) && taper_time_reached(at_ms, entry->sent_ms[c] + CROSSING_ms)) {
+            close_unheard(entry, c);
+            clear_bit(&entry->echoed, c);
+        }
+    }
 }
 
 /** Whether setpoint `c` was sent before `other`. Within a millisecond the counter tells. */
@@ -60,59 +157,105 @@ static bool sent_before(const taper_ledger_entry_t *entry, unsigned c, unsigned 
     return ((other - c) & (TAPER_LEDGER_SETPOINTS - 1u)) < TAPER_LEDGER_SETPOINTS / 2u;
 }
 
-/** An echo proves the setpoint it names, so whatever was sent before that is over. */
-static void hear_echo(taper_ledger_entry_t *entry, unsigned counter) {
-    if (!is_open(entry, counter)) {
+/** An echo proves the setpoint it names, so whatever was sent before that is over, and its fallback current too. */
+static void hear_echo(taper_ledger_entry_t *entry, unsigned counter, uint32_t followed_ms) {
+    if (!has_bit(entry->open, counter)) {
         return; /* an echo of long ago */
     }
-    if (entry->unknown_mA != 0) {
-        if (entry->first_echo == 0 || entry->first_echo == counter + 1u) {
-            entry->first_echo = (uint8_t)(counter + 1u);
-            return; /* perhaps a setpoint of the controller before us, with the same counter */
-        }
-        entry->unknown_mA = 0;
+    if (entry->first_echo == 0 || entry->first_echo == counter + 1u) {
+        entry->first_echo = (uint8_t)(counter + 1u);
+        return; /* perhaps a setpoint of the controller before us, with the same counter */
     }
+    end_unknown(entry, followed_ms);
+    entry->over_fallback_mA = 0; /* what is open is younger than what ran out */
     for (unsigned c = 0; c < TAPER_LEDGER_SETPOINTS; c++) {
-        if (c != counter && is_open(entry, c) && sent_before(entry, c, counter)) {
-            close_one(entry, c);
+        if (c != counter && has_bit(entry->echoed, c) && sent_before(entry, c, counter)) {
+            clear_bit(&entry->open, c);
+            clear_bit(&entry->echoed, c);
         }
     }
+}
+
+/** Fault 41. A report without a current tells nothing. */
+static void hear_draw(const taper_ledger_t *ledger, uint8_t connector, taper_ledger_entry_t *entry,
+                      const taper_evse_status_t *status, uint32_t at_ms) {
+    const int32_t measured_mA =
+        taper_max_i32(taper_max_i32(status->current_mA[0], status->current_mA[1]), status->current_mA[2]);
+    if (measured_mA == TAPER_ABSENT) {
+        return;
+    }
+    const bool over = measured_mA > taper_draw_tolerated_mA(taper_ledger_told_mA(ledger, connector));
+    entry->drawn_mA = over ? measured_mA : 0;
+    entry->drawn_until_ms = at_ms + ledger->validity_ms + reaction_ms(ledger, connector);
 }
 
 void taper_ledger_hear(taper_ledger_t *ledger, uint8_t connector, const taper_evse_status_t *status,
                        uint32_t at_ms) {
     taper_ledger_entry_t *entry = &ledger->entry[connector];
     if (!status->ev_present || status->pilot == TAPER_PILOT_A) {
-        close_all(entry); /* a setpoint does not outlive its session */
-    } else if (status->fallback_active) {
-        close_older(entry, at_ms, CROSSING_ms);
-        entry->unknown_mA = 0;
+        memset(entry, 0, sizeof *entry); /* a setpoint does not outlive its session */
+        entry->first_echo = ECHO_IS_OURS;
+        return;
+    }
+    const int32_t before_mA = in_force_mA(entry);
+    const uint32_t followed_ms = at_ms + reaction_ms(ledger, connector);
+    if (status->fallback_active) {
+        hear_fallback(entry, at_ms);
+        end_unknown(entry, followed_ms);
     } else {
-        hear_echo(entry, status->setpoint_echo);
+        hear_echo(entry, status->setpoint_echo, followed_ms);
+    }
+    follow_down(ledger, connector, entry, before_mA, at_ms);
+    drop_faded(entry, at_ms);
+    drop_unknown(entry, at_ms);
+    hear_draw(ledger, connector, entry, status, at_ms);
+}
+
+/** Setpoints expire. A report that names one may be on its way for a while more. */
+static void close_expired(const taper_ledger_t *ledger, taper_ledger_entry_t *entry, uint32_t now_ms) {
+    for (unsigned c = 0; c < TAPER_LEDGER_SETPOINTS; c++) {
+        const uint32_t end_ms = entry->sent_ms[c] + ledger->validity_ms + TAPER_LEDGER_LATE_ms;
+        if (has_bit(entry->open, c) && taper_time_reached(now_ms, end_ms)) {
+            close_unheard(entry, c);
+        }
+        if (has_bit(entry->echoed, c) && taper_time_reached(now_ms, end_ms + TAPER_LEDGER_LATE_ms)) {
+            clear_bit(&entry->echoed, c);
+        }
+    }
+}
+
+static void update_one(const taper_ledger_t *ledger, uint8_t connector, taper_ledger_entry_t *entry,
+                       uint32_t now_ms) {
+    const int32_t before_mA = in_force_mA(entry);
+    close_expired(ledger, entry, now_ms);
+    follow_down(ledger, connector, entry, before_mA, now_ms);
+    drop_faded(entry, now_ms);
+    if (taper_time_reached(now_ms + reaction_ms(ledger, connector), entry->unknown_until_ms)) {
+        entry->first_echo = ECHO_IS_OURS;
+    }
+    drop_unknown(entry, now_ms);
+    if (entry->drawn_mA != 0 && taper_time_reached(now_ms, entry->drawn_until_ms)) {
+        entry->drawn_mA = 0;
     }
 }
 
 void taper_ledger_update(taper_ledger_t *ledger, uint32_t now_ms) {
     for (uint8_t i = 0; i < ledger->config->connector_count; i++) {
-        taper_ledger_entry_t *entry = &ledger->entry[i];
-        close_older(entry, now_ms, ledger->validity_ms + TAPER_LEDGER_LATE_ms);
-        if (entry->unknown_mA != 0 && taper_time_reached(now_ms, entry->unknown_until_ms)) {
-            entry->unknown_mA = 0;
-        }
+        update_one(ledger, i, &ledger->entry[i], now_ms);
     }
 }
 
 int32_t taper_ledger_told_mA(const taper_ledger_t *ledger, uint8_t connector) {
     const taper_ledger_entry_t *entry = &ledger->entry[connector];
-    int32_t most_dA = 0;
-    for (unsigned c = 0; c < TAPER_LEDGER_SETPOINTS; c++) {
-        if (is_open(entry, c)) {
-            most_dA = taper_max_i32(most_dA, entry->sent_dA[c]);
-        }
-    }
-    return most_dA * TAPER_CURRENT_STEP_mA;
+    const int32_t known_mA = taper_max_i32(in_force_mA(entry), entry->fade[0].mA);
+    return taper_max_i32(known_mA, entry->unknown_mA);
 }
 
 int32_t taper_ledger_may_mA(const taper_ledger_t *ledger, uint8_t connector) {
-    return taper_max_i32(taper_ledger_told_mA(ledger, connector), ledger->entry[connector].unknown_mA);
+    return taper_max_i32(taper_ledger_told_mA(ledger, connector), ledger->entry[connector].drawn_mA);
+}
+
+int32_t taper_ledger_fallback_mA(const taper_ledger_t *ledger, uint8_t connector) {
+    const taper_ledger_entry_t *entry = &ledger->entry[connector];
+    return taper_max_i32(most_open_mA(entry, entry->fallback_dA), entry->over_fallback_mA);
 }

@@ -4,20 +4,38 @@
 
 #include "taper/rows.h"
 
-/** Rows of sums by group and kind, in thousandths of the row's unit: mW, or uA. INT64_MAX: there is no such row. */
+/** Rows of sums by group and column. A column is a kind of row that some group has: others cost nothing. */
 typedef struct {
-    int64_t room[TAPER_MAX_GROUPS][TAPER_ROW_SUMS];
+    uint8_t columns;
+    uint8_t kind[TAPER_ROW_SUMS]; /**< taper_row_kind_t by column */
+    int64_t room[TAPER_MAX_GROUPS]
+                [TAPER_ROW_SUMS]; /**< thousandths of the row's unit: mW, or uA. INT64_MAX: the group
+                                                         has no such row */
 } taper_rooms_t;
+
+/** Weights of one connector in the rows above it, by column; >= 0. */
+typedef struct {
+    int32_t of[TAPER_ROW_SUMS];
+} taper_weights_t;
 
 /** All rooms at their limits. */
 void taper_rooms_open(taper_rooms_t *rooms, const taper_station_config_t *config,
                       const taper_supply_t *supply);
 
-/** Most that connector `i` can be raised by [mA]; negative: some row above it is overdrawn. */
-int32_t taper_rooms_left_mA(const taper_rooms_t *rooms, const taper_station_config_t *config, uint8_t i,
-                            const taper_booking_t *booking);
+/** What 1 A of a connector takes from each column. */
+taper_weights_t taper_rooms_weigh(const taper_rooms_t *rooms, const taper_booking_t *booking);
+
+/** How much of `wanted_mA` (>= 0) connector `i` can be raised by [mA]; negative: some row above it is overdrawn. */
+int32_t taper_rooms_fit_mA(const taper_rooms_t *rooms, const taper_station_config_t *config, uint8_t i,
+                           const taper_weights_t *weights, int32_t wanted_mA);
 
 /** Take `current_mA` of connector `i` from all rows above it. */
+void taper_rooms_draw(taper_rooms_t *rooms, const taper_station_config_t *config, uint8_t i,
+                      const taper_weights_t *weights, int32_t current_mA);
+
+/** The same two for who asks once: the most that fits, and taking it. */
+int32_t taper_rooms_left_mA(const taper_rooms_t *rooms, const taper_station_config_t *config, uint8_t i,
+                            const taper_booking_t *booking);
 void taper_rooms_take(taper_rooms_t *rooms, const taper_station_config_t *config, uint8_t i,
                       const taper_booking_t *booking, int32_t current_mA);
 

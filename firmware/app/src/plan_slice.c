@@ -29,6 +29,18 @@ static uint32_t clock_us(const taper_station_t *station) {
     return port->clock_us != NULL ? port->clock_us(port->context) : 0;
 }
 
+/** What the plan gives a vehicle within the horizon, for its outlook. */
+static void keep_prospect(taper_station_t *station, uint8_t i, bool usable) {
+    const taper_station_config_t *config = station->options.config;
+    int64_t sum_Ws = 0;
+    for (uint8_t t = 0; usable && t < config->steps; t++) {
+        sum_Ws += (int64_t)taper_planner_power_W(&station->planner, i, t) * config->step_s;
+    }
+    station->prospect[i] = (taper_prospect_t){.made_ms = station->planner.started_ms,
+                                              .planned_Wh = taper_saturate_i32(sum_Ws / 3600),
+                                              .need_Wh = station->snapshot.demand[i].need_Wh};
+}
+
 /** Keep the first steps of a finished plan: the solver's memory is about to be used for the next one. */
 static void keep_plan(taper_station_t *station) {
     const bool usable = taper_planner_is_usable(station->planner.verdict);
@@ -36,6 +48,10 @@ static void keep_plan(taper_station_t *station) {
     station->last_solve_us = station->solve_us;
     if (!usable) {
         taper_station_count(station, TAPER_COUNTER_PLANS_REJECTED);
+    }
+    if (taper_health_judge(&station->health, usable, station->snapshot.now_ms)) {
+        taper_station_count(station, TAPER_COUNTER_PLANNER_OFFS);
+        taper_event_note(&station->events, TAPER_EVENT_PLANNER_OFF, 0, 0, (int32_t)station->planner.verdict);
     }
     station->plan_usable = usable;
     station->plan_made_ms = station->planner.started_ms;
@@ -45,11 +61,22 @@ static void keep_plan(taper_station_t *station) {
             station->plan_W[t][i] = planned ? taper_planner_power_W(&station->planner, i, t) : 0;
         }
         station->plan_session[i] = station->planner.session[i];
+        keep_prospect(station, i, usable);
     }
 }
 
+/** Whether the planner may be asked; notes when it may again. */
+static bool may_plan(taper_station_t *station) {
+    const bool was_off = station->health.off;
+    const bool may = taper_health_may_plan(&station->health, station->snapshot.now_ms);
+    if (was_off && may) {
+        taper_event_note(&station->events, TAPER_EVENT_PLANNER_ON, 0, 0, 0);
+    }
+    return may;
+}
+
 void taper_station_plan(taper_station_t *station, int32_t site_limit_W) {
-    if (station->options.solver == NULL || station->options.policy != NULL) {
+    if (station->options.solver == NULL || station->options.policy != NULL || !may_plan(station)) {
         return;
     }
     const uint32_t began_us = clock_us(station);

@@ -1,43 +1,87 @@
 /* Why a connector has the current that it has: what people ask first. */
+#include <string.h>
+
 #include "station_internal.h"
 #include "taper/battery.h"
-#include "taper/rows.h"
 
-/** Room below this is none: a step of the wire on three phases. */
-static bool is_full(int64_t limit_mW, int64_t sum_mW, int32_t W_per_A) {
-    return sum_mW + (int64_t)TAPER_CURRENT_STEP_mA * W_per_A > limit_mW;
-}
-
-/** What all connectors below a group have been given. */
-static int64_t group_sum_mW(const taper_station_t *station, uint8_t group) {
+static void add_connector(taper_station_t *station, uint8_t i) {
     const taper_station_config_t *config = station->options.config;
-    int64_t sum_mW = 0;
-    for (uint8_t i = 0; i < config->connector_count; i++) {
-        uint8_t k = config->connectors[i].group;
-        while (k != group && k != TAPER_NO_GROUP) {
-            k = config->groups[k].parent;
-        }
-        if (k == group && station->snapshot.demand[i].active) {
-            sum_mW += (int64_t)station->target.current_mA[i] *
-                      taper_booking_now(station->options.config, &station->snapshot, i).W_per_A;
+    const taper_booking_t booking = taper_booking_now(config, &station->snapshot, i);
+    for (int kind = 0; kind < TAPER_ROW_KINDS; kind++) {
+        const int64_t share =
+            (int64_t)station->target.current_mA[i] * taper_row_weight(&booking, (taper_row_kind_t)kind);
+        for (uint8_t k = config->connectors[i].group; k != TAPER_NO_GROUP; k = config->groups[k].parent) {
+            station->row_sum[k][kind] += share;
         }
     }
-    return sum_mW;
 }
 
-/** The limit that leaves no more for a connector, or PLANNED. */
-static taper_reason_t binding_limit(const taper_station_t *station, uint8_t i) {
-    const taper_station_config_t *config = station->options.config;
-    const int32_t W_per_A = taper_booking_now(station->options.config, &station->snapshot, i).W_per_A;
-    if (is_full((int64_t)station->limit_now.supply.site_W * 1000, group_sum_mW(station, 0), W_per_A)) {
-        return TAPER_REASON_SITE_LIMIT;
+void taper_station_sum_rows(taper_station_t *station) {
+    memset(station->row_sum, 0, sizeof station->row_sum);
+    for (uint8_t i = 0; i < station->options.config->connector_count; i++) {
+        if (station->target.current_mA[i] > 0) {
+            add_connector(station, i);
+        }
     }
+}
+
+/** Whether a row leaves less than a step of the wire for a connector. */
+static bool is_full(const taper_station_t *station, uint8_t k, taper_row_kind_t kind,
+                    const taper_booking_t *booking) {
+    const int32_t limit = taper_row_limit_now(station->options.config, &station->limit_now.supply, k, kind);
+    const int32_t weight = taper_row_weight(booking, kind);
+    const int64_t sum = station->row_sum[k][kind];
+    const int64_t step = (int64_t)TAPER_CURRENT_STEP_mA * weight;
+    const int64_t load = kind < TAPER_ROW_SUMS || weight > 0 ? sum + step : -(sum + step);
+    return limit != TAPER_NO_LIMIT && weight != 0 && load > (int64_t)limit * 1000;
+}
+
+/** What a full row is called. */
+static taper_reason_t name_of(const taper_station_t *station, uint8_t k, taper_row_kind_t kind) {
+    if (kind >= TAPER_ROW_SUMS) {
+        return TAPER_REASON_IMBALANCE_LIMIT;
+    }
+    if (kind != TAPER_ROW_POWER) {
+        return TAPER_REASON_PHASE_LIMIT;
+    }
+    if (k != 0) {
+        return TAPER_REASON_FEEDER_LIMIT;
+    }
+    return station->limit_now.source == TAPER_LIMIT_FAILSAFE ? TAPER_REASON_FAILSAFE_LIMIT
+                                                             : TAPER_REASON_SITE_LIMIT;
+}
+
+taper_reason_t taper_station_binding_limit(const taper_station_t *station, uint8_t i) {
+    const taper_station_config_t *config = station->options.config;
+    const taper_booking_t booking = taper_booking_now(config, &station->snapshot, i);
+    if (station->limit_now.supply.site_W <= 0) {
+        return station->limit_now.source == TAPER_LIMIT_FAILSAFE ? TAPER_REASON_FAILSAFE_LIMIT
+                                                                 : TAPER_REASON_GRID_PAUSE;
+    }
+    taper_reason_t found = TAPER_REASON_PLANNED;
     for (uint8_t k = config->connectors[i].group; k != TAPER_NO_GROUP; k = config->groups[k].parent) {
-        if (is_full((int64_t)config->groups[k].limit_W * 1000, group_sum_mW(station, k), W_per_A)) {
-            return TAPER_REASON_FEEDER_LIMIT;
+        for (int kind = TAPER_ROW_KINDS; kind-- > 0;) { /* the site's power last: it is told first */
+            if (is_full(station, k, (taper_row_kind_t)kind, &booking)) {
+                found = name_of(station, k, (taper_row_kind_t)kind);
+            }
         }
     }
-    return TAPER_REASON_PLANNED;
+    return found;
+}
+
+/** It has its target, and nothing of its own keeps it from more. */
+static taper_reason_t reason_of_target(const taper_station_t *station, uint8_t i) {
+    const taper_waiting_t waiting = taper_allocator_waiting(&station->allocator, i);
+    const taper_reason_t limit = taper_station_binding_limit(station, i);
+    if (limit == TAPER_REASON_GRID_PAUSE) {
+        return limit;
+    }
+    if (station->target.current_mA[i] == 0 && waiting.place > 0) {
+        return TAPER_REASON_WAITING;
+    }
+    const bool later = station->target.current_mA[i] == 0 && station->supervisor.mode == TAPER_MODE_PLAN &&
+                       station->proposal.wish_W[i] <= 0;
+    return later ? TAPER_REASON_PLANNED_LATER : limit;
 }
 
 /** For a vehicle that wants energy. */
@@ -45,26 +89,40 @@ static taper_reason_t reason_of_current(const taper_station_t *station, uint8_t 
     const taper_demand_t *demand = &station->snapshot.demand[i];
     const int32_t target_mA = station->target.current_mA[i];
     const int32_t useful_W = taper_battery_useful_W(demand, station->options.config->tick_ms);
+    if (station->shaped.current_mA[i] < target_mA) {
+        return TAPER_REASON_RAMP;
+    }
     if (station->setpoints.current_mA[i] < target_mA) {
         return TAPER_REASON_HAND_OVER;
     }
     if (target_mA + TAPER_CURRENT_STEP_mA > station->options.config->connectors[i].max_mA) {
         return TAPER_REASON_CONNECTOR_LIMIT;
     }
-    if (target_mA > 0 &&
-        (int64_t)(target_mA + TAPER_CURRENT_STEP_mA) * demand->W_per_A > (int64_t)useful_W * 1000) {
-        return TAPER_REASON_VEHICLE_LIMIT;
+    const bool all =
+        (int64_t)(target_mA + TAPER_CURRENT_STEP_mA) * demand->W_per_A > (int64_t)useful_W * 1000 ||
+        target_mA + TAPER_CURRENT_STEP_mA > demand->max_mA;
+    return target_mA > 0 && all ? TAPER_REASON_VEHICLE_LIMIT : reason_of_target(station, i);
+}
+
+/** What its vehicle did to be given nothing, or PLANNED. */
+static taper_reason_t reason_of_draw(const taper_station_t *station, uint8_t i) {
+    switch (station->draw[i].state) {
+    case TAPER_DRAW_OVER: return TAPER_REASON_OVER_DRAW;
+    case TAPER_DRAW_LOCKED: return TAPER_REASON_LOCKED_OUT;
+    case TAPER_DRAW_NORMAL:
+    default: return TAPER_REASON_PLANNED;
     }
-    const taper_reason_t limit = binding_limit(station, i);
-    return target_mA == 0 && demand->min_mA > 0 && station->limit_now.supply.site_W > 0 ? TAPER_REASON_WAITING
-                                                                                        : limit;
 }
 
 taper_reason_t taper_station_reason(const taper_station_t *station, uint8_t connector) {
+    const taper_reason_t draw = reason_of_draw(station, connector);
     const taper_reason_t idle =
         taper_session_idle_reason(&station->sessions, connector, station->events.now_ms);
-    if (idle != TAPER_REASON_PLANNED) {
+    if (idle != TAPER_REASON_PLANNED && (idle == TAPER_REASON_OFFLINE || draw == TAPER_REASON_PLANNED)) {
         return idle;
+    }
+    if (draw != TAPER_REASON_PLANNED) {
+        return draw;
     }
     const bool nobody = station->stopped || station->rival_heard ||
                         station->supervisor.mode == TAPER_MODE_INIT ||
@@ -73,10 +131,4 @@ taper_reason_t taper_station_reason(const taper_station_t *station, uint8_t conn
         return TAPER_REASON_STATION;
     }
     return reason_of_current(station, connector);
-}
-
-taper_outlook_t taper_station_outlook(const taper_station_t *station, uint8_t connector) {
-    return (taper_outlook_t){.reason = (uint8_t)taper_station_reason(station, connector),
-                             .soc_at_departure_permille = TAPER_ABSENT,
-                             .short_Wh = TAPER_ABSENT};
 }

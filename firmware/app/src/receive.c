@@ -179,15 +179,27 @@ static bool is_ours_to_send(const taper_frame_t *frame) {
            (function == TAPER_MESSAGE_CTRL_STATUS && node == TAPER_NODE_CONTROLLER);
 }
 
-static void set_curve(taper_station_t *station) {
-    const taper_status_t status = taper_limits_set_curve(&station->limits, &station->incoming_curve);
+/** The gateway is told what became of its curve of `count` points; the log has those that are in force. */
+static void answer_curve(taper_station_t *station, taper_status_t status, taper_event_code_t event,
+                         uint16_t count) {
     taper_transfers_answer(&station->transfers,
                            status == TAPER_OK ? TAPER_ANSWER_ACCEPTED : TAPER_ANSWER_CONTENT,
                            station->events.now_ms);
     if (status == TAPER_OK) {
-        taper_event_note(&station->events, TAPER_EVENT_CURVE_SET, 0, TAPER_NODE_GATEWAY,
-                         station->incoming_curve.count);
+        taper_event_note(&station->events, event, 0, TAPER_NODE_GATEWAY, count);
     }
+}
+
+static void set_curve(taper_station_t *station) {
+    const taper_limit_curve_t *curve = &station->incoming.curve;
+    answer_curve(station, taper_limits_set_curve(&station->limits, TAPER_CURVE_OF_GATEWAY, curve),
+                 TAPER_EVENT_CURVE_SET, curve->count);
+}
+
+static void set_price(taper_station_t *station) {
+    const taper_price_curve_t *price = &station->incoming.price;
+    answer_curve(station, taper_limits_set_price(&station->limits, price), TAPER_EVENT_PRICE_SET,
+                 price->count);
 }
 
 static void note_identifier(taper_station_t *station, const taper_frame_t *frame, uint8_t connector) {
@@ -203,10 +215,10 @@ static void take_transfer(taper_station_t *station, const taper_frame_t *frame) 
                                           .unix_s = taper_session_unix_s(&station->sessions, now_ms),
                                           .time_scale = station->sessions.time_scale,
                                           .events = &station->events};
-    uint8_t connector = 0;
-    switch (taper_transfers_take(&station->transfers, frame, &scene, &station->incoming_curve, &connector)) {
+    switch (taper_transfers_take(&station->transfers, frame, &scene, &station->incoming)) {
     case TAPER_RESULT_CURVE: set_curve(station); break;
-    case TAPER_RESULT_IDENTIFIER: note_identifier(station, frame, connector); break;
+    case TAPER_RESULT_PRICE: set_price(station); break;
+    case TAPER_RESULT_IDENTIFIER: note_identifier(station, frame, station->incoming.connector); break;
     case TAPER_RESULT_REFUSED: /* counted there, and noted with those that ran out of time */
     case TAPER_RESULT_NONE:
     default: break;
@@ -218,6 +230,7 @@ static void take_report(taper_station_t *station, taper_frame_t *frame) {
     taper_message_t message;
     bool bad_field = false;
     if (!find_sender(station, frame, &sender)) {
+        taper_strangers_hear(station, frame);
         taper_station_count(station, TAPER_COUNTER_FRAMES_UNKNOWN);
         return;
     }

@@ -40,20 +40,29 @@ bool taper_station_send_message(taper_station_t *station, const taper_message_t 
     return true;
 }
 
+static taper_command_t command_for(const taper_station_t *station, uint8_t i) {
+    if (station->draw[i].state == TAPER_DRAW_LOCKED) {
+        return TAPER_COMMAND_STOP;
+    }
+    return station->setpoints.current_mA[i] > 0 ? TAPER_COMMAND_CHARGE : TAPER_COMMAND_PAUSE;
+}
+
 static taper_message_t setpoint_of(const taper_station_t *station, uint8_t i) {
     const taper_connector_config_t *connector = &station->options.config->connectors[i];
     const int32_t current_mA = station->setpoints.current_mA[i];
+    const taper_demand_t *demand = &station->snapshot.demand[i];
+    const uint8_t conductors = demand->active ? demand->conductors : connector->phases;
     return (taper_message_t){
         .kind = TAPER_MESSAGE_SETPOINT,
         .bus = connector->bus,
         .node = connector->node,
         .as.setpoint =
             {
-                .command = current_mA > 0 ? TAPER_COMMAND_CHARGE : TAPER_COMMAND_PAUSE,
+                .command = command_for(station, i),
                 .current_mA = current_mA,
                 .validity_ms = (int32_t)station->ledger.validity_ms,
-                .fallback_mA = 0,
-                .phase_mask = connector->phases == 3 ? 7 : 1,
+                .fallback_mA = station->fallback.current_mA[i],
+                .phase_mask = (uint8_t)((1u << conductors) - 1u), /* others are not booked */
                 .session = station->setpoint_session[i],
             },
     };
@@ -76,8 +85,14 @@ static void send_setpoint(taper_station_t *station, uint8_t i, uint32_t now_ms) 
         return;
     }
     if (taper_station_send_message(station, &message, &station->setpoint_counter[i], now_ms)) {
-        taper_ledger_sent(&station->ledger, i, counter, station->setpoints.current_mA[i], 0, now_ms);
+        const bool new_session = station->sent_session[i] != station->setpoint_session[i];
+        taper_ledger_sent(&station->ledger, i, counter, station->setpoints.current_mA[i],
+                          station->fallback.current_mA[i], now_ms);
+        taper_shape_sent(&station->shape, i, station->setpoints.current_mA[i], new_session,
+                         now_ms * station->options.time_scale);
         station->sent_mA[i] = station->setpoints.current_mA[i];
+        station->sent_fallback_mA[i] = station->fallback.current_mA[i];
+        station->sent_command[i] = (uint8_t)message.as.setpoint.command;
         station->sent_session[i] = station->setpoint_session[i];
         station->sent_ms[i] = now_ms;
     }
@@ -85,11 +100,14 @@ static void send_setpoint(taper_station_t *station, uint8_t i, uint32_t now_ms) 
 
 static bool is_due(const taper_station_t *station, uint8_t i, uint32_t now_ms) {
     return station->setpoints.current_mA[i] != station->sent_mA[i] ||
+           station->fallback.current_mA[i] != station->sent_fallback_mA[i] ||
+           (uint8_t)command_for(station, i) != station->sent_command[i] ||
            station->setpoint_session[i] != station->sent_session[i] ||
            taper_elapsed_ms(now_ms, station->sent_ms[i]) >= TAPER_SETPOINT_CYCLE_ms;
 }
 
 void taper_station_send_setpoints(taper_station_t *station, uint32_t now_ms) {
+    taper_station_check_seal(station, now_ms);
     for (uint8_t i = 0; i < station->options.config->connector_count; i++) {
         if (is_due(station, i, now_ms)) {
             send_setpoint(station, i, now_ms);
@@ -175,6 +193,7 @@ void taper_station_send_display(taper_station_t *station, uint32_t now_ms) {
         send_outlook(station, station->next_plan, now_ms);
         station->next_plan = (uint8_t)((station->next_plan + 1) % connectors);
     }
+    taper_strangers_send(station, now_ms);
     send_diag(station, now_ms);
 }
 

@@ -20,6 +20,10 @@ static void init_layers(taper_station_t *station) {
     taper_limits_init(&station->limits, config);
     taper_supervisor_init(&station->supervisor);
     taper_allocator_init(&station->allocator);
+    taper_shape_init(&station->shape);
+    for (uint8_t i = 0; i < config->connector_count; i++) {
+        taper_draw_init(&station->draw[i]);
+    }
     taper_transfers_init(&station->transfers, config);
     station->sessions.log = &station->events;
     station->sessions.time_scale = station->options.time_scale;
@@ -47,86 +51,15 @@ taper_status_t taper_station_init(taper_station_t *station, const taper_station_
     return TAPER_OK;
 }
 
-static void note_mode(taper_station_t *station, taper_mode_t before) {
-    const taper_mode_t mode = station->supervisor.mode;
-    if (mode != before) {
-        taper_event_note(&station->events, TAPER_EVENT_MODE, 0, 0, (int32_t)mode);
-    }
-    if (mode == TAPER_MODE_FALLBACK || mode == TAPER_MODE_FAILSAFE) {
-        taper_station_count(station, TAPER_COUNTER_FALLBACK_TICKS);
-    }
-}
-
-static taper_mode_t decide_mode(taper_station_t *station, uint32_t now_ms) {
-    const taper_mode_t before = station->supervisor.mode;
-    const taper_situation_t situation = {
-        .gateway_alive = taper_limits_gateway_alive(&station->limits, now_ms),
-        .gateway_heard = station->limits.heard,
-        .proposal_ready = station->options.policy != NULL || taper_station_has_plan(station),
-    };
-    const taper_mode_t mode = taper_supervisor_update(&station->supervisor, &situation, now_ms);
-    note_mode(station, before);
-    return mode;
-}
-
-static void propose(taper_station_t *station, taper_mode_t mode, int32_t site_limit_W) {
-    const taper_policy_t *policy = station->options.policy;
-    if (mode != TAPER_MODE_PLAN) {
-        taper_propose_edf(&station->snapshot, station->options.config->tick_ms, &station->proposal);
-    } else if (policy != NULL) {
-        policy->propose(policy->context, &station->snapshot, site_limit_W, &station->proposal);
-    } else {
-        taper_station_propose_plan(station);
-    }
-}
-
-/** Currents for the proposal that hold every limit, once all connectors have followed. */
-static void allocate(taper_station_t *station, uint32_t now_ms) {
-    const taper_station_config_t *config = station->options.config;
-    int32_t reserved_mA[TAPER_MAX_CONNECTORS];
-    for (uint8_t i = 0; i < config->connector_count; i++) {
-        const bool online = taper_session_is_online(&station->sessions, i, now_ms);
-        reserved_mA[i] = online ? 0 : taper_ledger_may_mA(&station->ledger, i);
-        station->setpoint_session[i] = taper_session_number(&station->sessions, i);
-    }
-    taper_allocate(&station->allocator, config, &station->snapshot, &station->proposal,
-                   &station->limit_now.supply, reserved_mA, &station->target);
-    if (station->rival_heard || station->stopped) {
-        memset(&station->target, 0, sizeof station->target);
-    }
-}
-
-/** What of the target is paid for by now. Nothing that the guards refuse gets out. */
-static void grant(taper_station_t *station, taper_setpoints_t *granted) {
-    const taper_station_config_t *config = station->options.config;
-    const taper_supply_t *supply = &station->limit_now.supply;
-    taper_ledger_grant(&station->ledger, config, &station->snapshot, station->proposal.rank, supply,
-                       &station->target, granted);
-    if (!taper_guard_passes(config, &station->snapshot, supply, granted) ||
-        !taper_guard_hand_over_passes(&station->ledger, config, &station->snapshot, supply, granted)) {
-        taper_station_count(station, TAPER_COUNTER_GUARD_VIOLATIONS);
-        taper_event_note(&station->events, TAPER_EVENT_GUARD, 0, 0, 0);
-        memset(granted, 0, sizeof *granted);
-    }
-}
-
-bool taper_station_hands_over(const taper_station_t *station) {
-    return memcmp(&station->target, &station->setpoints, sizeof station->target) != 0;
-}
-
-/** Grant again, between ticks. */
-static void regrant(taper_station_t *station) {
-    if (taper_station_hands_over(station)) {
-        grant(station, &station->setpoints);
-    }
-}
-
 static void watch_rival(taper_station_t *station, uint32_t now_ms) {
     if (station->rival_heard && taper_elapsed_ms(now_ms, station->rival_ms) >= RIVAL_GONE_ms) {
         station->rival_heard = false;
     }
     if (station->rival_heard) {
         taper_alarm_raise(station, TAPER_EVENT_TWO_CONTROLLERS, 0, 0, now_ms);
+    }
+    if (station->limits.is_negative) {
+        taper_alarm_raise(station, TAPER_EVENT_LIMIT_NEGATIVE, 0, TAPER_NODE_GATEWAY, now_ms);
     }
 }
 
@@ -155,6 +88,19 @@ static void copy_counters(taper_station_t *station) {
     count[TAPER_COUNTER_PARAMETERS_REPAIRED] = station->sessions.repaired;
 }
 
+/** A step that comes late tells that the one before, or what ran beside it, took too long. */
+static void watch_ticks(taper_station_t *station, uint32_t now_ms) {
+    const uint32_t tick_ms = station->options.config->tick_ms / station->options.time_scale;
+    const uint32_t passed_ms = station->stepped ? taper_elapsed_ms(now_ms, station->stepped_ms) : 0;
+    const uint32_t late_ms = passed_ms > tick_ms ? passed_ms - tick_ms : 0;
+    if (taper_self_ticked(&station->self, late_ms, tick_ms)) {
+        taper_station_count(station, TAPER_COUNTER_TICK_OVERRUNS);
+        taper_event_note(&station->events, TAPER_EVENT_TICK_OVERRUN, 0, 0, taper_saturate_i32(late_ms));
+    }
+    station->stepped = true;
+    station->stepped_ms = now_ms;
+}
+
 /** Who leaves takes his name along. */
 static void forget_identifiers(taper_station_t *station) {
     for (uint8_t i = 0; i < station->options.config->connector_count; i++) {
@@ -164,26 +110,14 @@ static void forget_identifiers(taper_station_t *station) {
     }
 }
 
-static void decide(taper_station_t *station, uint32_t now_ms) {
-    taper_session_snapshot(&station->sessions, now_ms, &station->snapshot);
-    station->limit_now = taper_limits_now(&station->limits, now_ms);
-    taper_station_plan(station, station->limit_now.supply.site_W);
-    const taper_mode_t mode = decide_mode(station, now_ms);
-    if (mode == TAPER_MODE_INIT) {
-        station->limit_now.supply.site_W = 0;
-    }
-    propose(station, mode, station->limit_now.supply.site_W);
-    allocate(station, now_ms);
-    grant(station, &station->setpoints);
-}
-
 void taper_station_step(taper_station_t *station, uint32_t now_ms) {
     const taper_port_t *port = station->options.port;
     begin(station, now_ms);
+    watch_ticks(station, now_ms);
     taper_session_update(&station->sessions, now_ms);
     taper_limits_update(&station->limits, now_ms);
     forget_identifiers(station);
-    decide(station, now_ms);
+    taper_station_decide(station, now_ms);
     taper_station_send_setpoints(station, now_ms);
     copy_counters(station);
     taper_station_send_display(station, now_ms);
@@ -192,14 +126,14 @@ void taper_station_step(taper_station_t *station, uint32_t now_ms) {
     memset(station->status_due, 1, sizeof station->status_due);
     taper_station_send_status(station, now_ms);
     taper_record_update(station, now_ms);
-    if (port->kick_watchdog != NULL) {
+    if (port->kick_watchdog != NULL && taper_self_is_sound(&station->self)) {
         port->kick_watchdog(port->context);
     }
 }
 
 void taper_station_poll(taper_station_t *station, uint32_t now_ms) {
     begin(station, now_ms);
-    regrant(station);
+    taper_station_regrant(station, now_ms);
     taper_station_send_setpoints(station, now_ms);
     taper_alarm_update(station, now_ms);
     taper_station_send_transfers(station, now_ms);
@@ -212,14 +146,20 @@ void taper_station_stop(taper_station_t *station, uint32_t now_ms) {
         taper_event_note(&station->events, TAPER_EVENT_STOPPED, 0, 0, 0);
     }
     station->stopped = true;
-    memset(&station->target, 0, sizeof station->target); /* the fallback current of every connector is 0 */
-    memset(&station->setpoints, 0, sizeof station->setpoints);
+    station->target = station->fallback;
+    station->setpoints = station->fallback; /* never above what they have */
+    taper_station_seal(station);
     taper_station_forget_sent(station);
     taper_station_send_setpoints(station, now_ms);
 }
 
 taper_status_t taper_station_set_limit_curve(taper_station_t *station, const taper_limit_curve_t *curve) {
-    return curve == NULL ? TAPER_ERR_ARGUMENT : taper_limits_set_curve(&station->limits, curve);
+    return curve == NULL ? TAPER_ERR_ARGUMENT
+                         : taper_limits_set_curve(&station->limits, TAPER_CURVE_OF_FILE, curve);
+}
+
+taper_status_t taper_station_set_price_curve(taper_station_t *station, const taper_price_curve_t *curve) {
+    return curve == NULL ? TAPER_ERR_ARGUMENT : taper_limits_set_price(&station->limits, curve);
 }
 
 const taper_event_log_t *taper_station_events(const taper_station_t *station) {

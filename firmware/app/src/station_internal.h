@@ -37,6 +37,39 @@ uint32_t taper_node_guard_time(const taper_node_guard_t *guard, uint32_t at_ms, 
 bool taper_node_guard_passes(taper_station_t *station, taper_node_guard_t *guard, uint32_t per_second,
                              const taper_frame_t *frame);
 
+/* decide.c */
+
+/** Snapshot, limits, plan, mode, proposal, target, setpoints. */
+void taper_station_decide(taper_station_t *station, uint32_t now_ms);
+
+/** Grant again, between ticks: time or others have made room. */
+void taper_station_regrant(taper_station_t *station, uint32_t now_ms);
+
+/** Keep the inverse of the setpoints and fallback currents beside them. */
+void taper_station_seal(taper_station_t *station);
+
+/** Whether they are as they were decided. */
+bool taper_station_is_sealed(const taper_station_t *station);
+
+/** Fault 48: if not, they are worked out again. */
+void taper_station_check_seal(taper_station_t *station, uint32_t now_ms);
+
+/* reason.c */
+
+/** The limit of site or tree that leaves no more for connector `i`, or PLANNED. Cost: O(depth of the tree). */
+taper_reason_t taper_station_binding_limit(const taper_station_t *station, uint8_t i);
+
+/** Sums of the targets in every row: what the reasons are found from. */
+void taper_station_sum_rows(taper_station_t *station);
+
+/* strangers.c: fault 31 */
+
+/** Take in a frame of a node that the station has no place for; others are ignored. */
+void taper_strangers_hear(taper_station_t *station, const taper_frame_t *frame);
+
+/** Once a second: tell them to pause, and where they stand. */
+void taper_strangers_send(taper_station_t *station, uint32_t now_ms);
+
 /* plan_slice.c */
 
 /** One slice of planning: start a problem if one is due, work on the one under way, keep the result. */

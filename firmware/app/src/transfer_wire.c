@@ -9,12 +9,15 @@
 #define CRC_BYTES      4u
 #define CURVE_STEP_W   100
 #define CURVE_SPAN_s   (TAPER_CURVE_SPAN_ms / 1000u)
+#define PRICE_ENDED_s  (2u * TAPER_PRICE_HOLDS_ms / 1000u)
+#define NO_PRICE       0x8000u
 #define FIRST_PRINTING 0x20u
 #define LAST_PRINTING  0x7Eu
 
 _Static_assert(TAPER_TRANSFER_ENVELOPE == HEADER_BYTES + CRC_BYTES, "the envelope is header and CRC");
 _Static_assert(TAPER_TRANSFER_ENVELOPE + TAPER_MAX_LIMIT_POINTS * TAPER_CURVE_ITEM <= TAPER_ISOTP_LONGEST,
                "the longest curve is one message");
+_Static_assert(TAPER_MAX_PRICE_POINTS <= TAPER_MAX_LIMIT_POINTS, "prices fit into the gateway's buffer too");
 _Static_assert(TAPER_TRANSFER_ENVELOPE + TAPER_EVENTS * TAPER_LOG_ITEM <= TAPER_ISOTP_LONGEST,
                "the whole log is one message");
 _Static_assert((TAPER_EVENTS & (TAPER_EVENTS - 1u)) == 0,
@@ -41,15 +44,16 @@ static void put_u32(uint8_t *to, uint32_t value) {
 /** Bytes of an item that a sender may give us; 0: it has no items. */
 static uint16_t item_bytes(uint8_t type) {
     switch (type) {
-    case TAPER_TRANSFER_LIMIT_CURVE: return TAPER_CURVE_ITEM;
+    case TAPER_TRANSFER_LIMIT_CURVE:
+    case TAPER_TRANSFER_PRICE_CURVE: return TAPER_CURVE_ITEM;
     case TAPER_TRANSFER_IDENTIFIER: return 1;
     default: return 0;
     }
 }
 
 static bool is_for_us(uint8_t type) {
-    return type == TAPER_TRANSFER_LIMIT_CURVE || type == TAPER_TRANSFER_IDENTIFIER ||
-           type == TAPER_TRANSFER_LOG_REQUEST;
+    return type == TAPER_TRANSFER_LIMIT_CURVE || type == TAPER_TRANSFER_PRICE_CURVE ||
+           type == TAPER_TRANSFER_IDENTIFIER || type == TAPER_TRANSFER_LOG_REQUEST;
 }
 
 taper_transfer_answer_t taper_transfer_open(const uint8_t *message, uint16_t length,
@@ -106,8 +110,12 @@ static uint32_t point_unix_s(const taper_transfer_t *transfer, uint16_t k) {
     return get_u32(transfer->items + (size_t)k * TAPER_CURVE_ITEM);
 }
 
+static uint16_t point_value(const taper_transfer_t *transfer, uint16_t k) {
+    return get_u16(transfer->items + (size_t)k * TAPER_CURVE_ITEM + 4);
+}
+
 /** Whether times ascend and none is too far ahead. */
-static bool curve_is_good(const taper_transfer_t *transfer, uint32_t now_unix_s) {
+static bool times_are_good(const taper_transfer_t *transfer, uint32_t now_unix_s) {
     for (uint16_t k = 0; k < transfer->count; k++) {
         const uint32_t at_s = point_unix_s(transfer, k);
         if ((k > 0 && at_s <= point_unix_s(transfer, (uint16_t)(k - 1))) ||
@@ -115,31 +123,86 @@ static bool curve_is_good(const taper_transfer_t *transfer, uint32_t now_unix_s)
             return false;
         }
     }
-    return transfer->count <= TAPER_MAX_LIMIT_POINTS;
+    return true;
+}
+
+/** What a curve of up to `most` points has to be, whatever its values. */
+static taper_transfer_answer_t check_curve(const taper_transfer_t *transfer,
+                                           const taper_transfer_scene_t *scene, uint16_t most) {
+    if (transfer->count > 0 && !scene->clock_is_set) {
+        return TAPER_ANSWER_CLOCK;
+    }
+    return transfer->count <= most && times_are_good(transfer, scene->unix_s) ? TAPER_ANSWER_ACCEPTED
+                                                                              : TAPER_ANSWER_CONTENT;
+}
+
+/** The first point that matters: of those past, the last. */
+static uint16_t first_point(const taper_transfer_t *transfer, uint32_t now_unix_s) {
+    uint16_t k = 0;
+    while (k + 1u < transfer->count && point_unix_s(transfer, (uint16_t)(k + 1)) <= now_unix_s) {
+        k++;
+    }
+    return k;
+}
+
+/** The time of a point on the station's world clock; now, if it is past. */
+static uint32_t point_ms(const taper_transfer_t *transfer, const taper_transfer_scene_t *scene, uint16_t k) {
+    const uint32_t at_s = point_unix_s(transfer, k);
+    const uint32_t ahead_s = at_s > scene->unix_s ? at_s - scene->unix_s : 0;
+    return scene->now_ms * scene->time_scale + ahead_s * 1000u;
 }
 
 taper_transfer_answer_t taper_transfer_read_curve(const taper_transfer_t *transfer,
                                                   const taper_transfer_scene_t *scene,
                                                   taper_limit_curve_t *curve) {
-    if (transfer->count > 0 && !scene->clock_is_set) {
-        return TAPER_ANSWER_CLOCK;
+    const taper_transfer_answer_t answer = check_curve(transfer, scene, TAPER_MAX_LIMIT_POINTS);
+    if (answer != TAPER_ANSWER_ACCEPTED) {
+        return answer;
     }
-    if (!curve_is_good(transfer, scene->unix_s)) {
+    curve->count = 0;
+    for (uint16_t k = first_point(transfer, scene->unix_s); k < transfer->count; k++) {
+        curve->point[curve->count] = (taper_limit_point_t){
+            .time_ms = point_ms(transfer, scene, k), .limit_W = point_value(transfer, k) * CURVE_STEP_W};
+        curve->count++;
+    }
+    return TAPER_ANSWER_ACCEPTED;
+}
+
+static bool prices_are_good(const taper_transfer_t *transfer) {
+    bool good = true;
+    for (uint16_t k = 0; k < transfer->count; k++) {
+        good = good && point_value(transfer, k) != NO_PRICE;
+    }
+    return good;
+}
+
+/** How long ago the last point was, as far as it matters [ms]. */
+static uint32_t last_age_ms(const taper_transfer_t *transfer, uint32_t now_unix_s) {
+    const uint32_t last_s = point_unix_s(transfer, (uint16_t)(transfer->count - 1));
+    const uint32_t age_s = last_s < now_unix_s ? now_unix_s - last_s : 0;
+    return (age_s < PRICE_ENDED_s ? age_s : PRICE_ENDED_s) * 1000u;
+}
+
+taper_transfer_answer_t taper_transfer_read_price(const taper_transfer_t *transfer,
+                                                  const taper_transfer_scene_t *scene,
+                                                  taper_price_curve_t *price) {
+    const taper_transfer_answer_t answer = check_curve(transfer, scene, TAPER_MAX_PRICE_POINTS);
+    if (answer != TAPER_ANSWER_ACCEPTED) {
+        return answer;
+    }
+    if (!prices_are_good(transfer)) {
         return TAPER_ANSWER_CONTENT;
     }
-    const uint32_t world_ms = scene->now_ms * scene->time_scale;
-    curve->count = 0;
-    for (uint16_t k = 0; k < transfer->count; k++) {
-        const uint32_t at_s = point_unix_s(transfer, k);
-        const bool ahead = at_s > scene->unix_s;
-        if (!ahead && k > 0) {
-            curve->count = 0; /* this point supersedes those before it */
-        }
-        curve->point[curve->count] = (taper_limit_point_t){
-            .time_ms = ahead ? world_ms + (at_s - scene->unix_s) * 1000u : world_ms,
-            .limit_W = get_u16(transfer->items + (size_t)k * TAPER_CURVE_ITEM + 4) * CURVE_STEP_W,
-        };
-        curve->count++;
+    price->count = 0;
+    for (uint16_t k = first_point(transfer, scene->unix_s); k < transfer->count; k++) {
+        const int32_t value = point_value(transfer, k);
+        price->point[price->count] =
+            (taper_price_point_t){.time_ms = point_ms(transfer, scene, k),
+                                  .milli_per_kWh = value < (int32_t)NO_PRICE ? value : value - 0x10000};
+        price->count++;
+    }
+    if (price->count > 0) { /* no change, unless the last point is past */
+        price->point[price->count - 1].time_ms -= last_age_ms(transfer, scene->unix_s);
     }
     return TAPER_ANSWER_ACCEPTED;
 }

@@ -26,6 +26,11 @@ taper_transfer_answer_t taper_transfer_read_curve(const taper_transfer_t *transf
                                                   const taper_transfer_scene_t *scene,
                                                   taper_limit_curve_t *curve);
 
+/** The same for prices. */
+taper_transfer_answer_t taper_transfer_read_price(const taper_transfer_t *transfer,
+                                                  const taper_transfer_scene_t *scene,
+                                                  taper_price_curve_t *price);
+
 /** Read an identifier, [TAPER_IDENTIFIER_LENGTH + 1]. @return ACCEPTED, or CONTENT and nothing touched. */
 taper_transfer_answer_t taper_transfer_read_identifier(const taper_transfer_t *transfer, char *identifier);
 

@@ -88,16 +88,16 @@ static bool drop_failed(taper_transfers_t *transfers, taper_isotp_t *link, uint3
 
 /**
  * Open the message on `link` if it is whole, and free its buffer: the bytes stay until the next frame is taken.
- * @return false if there is none; `*answer` says whether its envelope is good, and whether it is a `type`.
+ * @return false if there is none; `*answer` says whether its envelope is good, and whether it is one of `types`, a bit each.
  */
-static bool open_whole(taper_isotp_t *link, uint32_t now_ms, taper_transfer_type_t type,
-                       taper_transfer_t *transfer, taper_transfer_answer_t *answer) {
+static bool open_whole(taper_isotp_t *link, uint32_t now_ms, unsigned types, taper_transfer_t *transfer,
+                       taper_transfer_answer_t *answer) {
     uint16_t length = 0;
     if (taper_isotp_received(link, &length) != TAPER_ISOTP_DONE) {
         return false;
     }
     *answer = taper_transfer_open(link->options.buffer, length, transfer);
-    if (*answer == TAPER_ANSWER_ACCEPTED && transfer->type != type) {
+    if (*answer == TAPER_ANSWER_ACCEPTED && (1u << transfer->type & types) == 0) {
         *answer = TAPER_ANSWER_VERSION;
     }
     taper_isotp_release(link, now_ms);
@@ -105,17 +105,20 @@ static bool open_whole(taper_isotp_t *link, uint32_t now_ms, taper_transfer_type
 }
 
 static taper_transfer_result_t take_curve(taper_transfers_t *transfers, const taper_transfer_scene_t *scene,
-                                          taper_limit_curve_t *curve) {
+                                          taper_transfer_content_t *content) {
+    const unsigned types = 1u << TAPER_TRANSFER_LIMIT_CURVE | 1u << TAPER_TRANSFER_PRICE_CURVE;
     taper_transfer_t transfer;
     taper_transfer_answer_t answer;
-    if (!open_whole(&transfers->gateway, scene->now_ms, TAPER_TRANSFER_LIMIT_CURVE, &transfer, &answer)) {
+    if (!open_whole(&transfers->gateway, scene->now_ms, types, &transfer, &answer)) {
         return TAPER_RESULT_NONE;
     }
+    const bool prices = answer == TAPER_ANSWER_ACCEPTED && transfer.type == TAPER_TRANSFER_PRICE_CURVE;
     if (answer == TAPER_ANSWER_ACCEPTED) {
-        answer = taper_transfer_read_curve(&transfer, scene, curve);
+        answer = prices ? taper_transfer_read_price(&transfer, scene, &content->price)
+                        : taper_transfer_read_curve(&transfer, scene, &content->curve);
     }
-    if (answer == TAPER_ANSWER_ACCEPTED) {
-        return TAPER_RESULT_CURVE; /* the station has the last word: taper_transfers_answer() */
+    if (answer == TAPER_ANSWER_ACCEPTED) { /* the station has the last word: taper_transfers_answer() */
+        return prices ? TAPER_RESULT_PRICE : TAPER_RESULT_CURVE;
     }
     taper_transfers_answer(transfers, answer, scene->now_ms);
     return TAPER_RESULT_REFUSED;
@@ -125,7 +128,7 @@ static taper_transfer_result_t take_request(taper_transfers_t *transfers,
                                             const taper_transfer_scene_t *scene) {
     taper_transfer_t transfer;
     taper_transfer_answer_t answer;
-    if (!open_whole(&transfers->tool, scene->now_ms, TAPER_TRANSFER_LOG_REQUEST, &transfer, &answer)) {
+    if (!open_whole(&transfers->tool, scene->now_ms, 1u << TAPER_TRANSFER_LOG_REQUEST, &transfer, &answer)) {
         return TAPER_RESULT_NONE;
     }
     if (answer != TAPER_ANSWER_ACCEPTED) {
@@ -141,10 +144,12 @@ static taper_transfer_result_t take_request(taper_transfers_t *transfers,
 }
 
 static taper_transfer_result_t take_identifier(taper_transfers_t *transfers,
-                                               const taper_transfer_scene_t *scene, uint8_t *connector) {
+                                               const taper_transfer_scene_t *scene,
+                                               taper_transfer_content_t *content) {
     taper_transfer_t transfer;
     taper_transfer_answer_t answer;
-    if (!open_whole(&transfers->connector, scene->now_ms, TAPER_TRANSFER_IDENTIFIER, &transfer, &answer)) {
+    if (!open_whole(&transfers->connector, scene->now_ms, 1u << TAPER_TRANSFER_IDENTIFIER, &transfer,
+                    &answer)) {
         return TAPER_RESULT_NONE;
     }
     if (answer == TAPER_ANSWER_ACCEPTED) {
@@ -156,17 +161,17 @@ static taper_transfer_result_t take_identifier(taper_transfers_t *transfers,
         return TAPER_RESULT_REFUSED;
     }
     taper_count(&transfers->accepted);
-    *connector = transfers->connector_index;
+    content->connector = transfers->connector_index;
     return TAPER_RESULT_IDENTIFIER;
 }
 
 taper_transfer_result_t taper_transfers_take(taper_transfers_t *transfers, const taper_frame_t *frame,
-                                             const taper_transfer_scene_t *scene, taper_limit_curve_t *curve,
-                                             uint8_t *connector) {
+                                             const taper_transfer_scene_t *scene,
+                                             taper_transfer_content_t *content) {
     if (taper_isotp_take(&transfers->gateway, frame, scene->now_ms)) {
         return drop_failed(transfers, &transfers->gateway, scene->now_ms)
                    ? TAPER_RESULT_REFUSED
-                   : take_curve(transfers, scene, curve);
+                   : take_curve(transfers, scene, content);
     }
     if (taper_isotp_take(&transfers->tool, frame, scene->now_ms)) {
         return drop_failed(transfers, &transfers->tool, scene->now_ms) ? TAPER_RESULT_REFUSED
@@ -177,7 +182,7 @@ taper_transfer_result_t taper_transfers_take(taper_transfers_t *transfers, const
     if (claimed && taper_isotp_take(&transfers->connector, frame, scene->now_ms)) {
         return drop_failed(transfers, &transfers->connector, scene->now_ms)
                    ? TAPER_RESULT_REFUSED
-                   : take_identifier(transfers, scene, connector);
+                   : take_identifier(transfers, scene, content);
     }
     return TAPER_RESULT_NONE;
 }

@@ -219,7 +219,8 @@ bool taper_session_demand(const taper_session_table_t *table, uint8_t connector,
     demand->max_mA = max_mA;
     demand->min_mA = min_mA;
     demand->W_per_A = voltage_V * phases_in_use(config, session);
-    demand->booking = booking_of(table, connector, now_ms, phases_in_use(config, session));
+    demand->conductors = phases_in_use(config, session);
+    demand->booking = booking_of(table, connector, now_ms, demand->conductors);
     demand->departs_in_s = departs_in_s(table, session, now_ms);
     fill_battery(demand, session, now_ms);
     return true;

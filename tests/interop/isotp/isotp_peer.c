@@ -168,21 +168,34 @@ static void print_curve(const taper_limit_curve_t *curve, const taper_transfer_s
     puts("");
 }
 
+static void print_price(const taper_price_curve_t *price, const taper_transfer_scene_t *scene) {
+    printf("price %u", price->count);
+    for (uint16_t k = 0; k < price->count; k++) {
+        const uint32_t ahead_s = taper_elapsed_ms(price->point[k].time_ms, scene->now_ms) / 1000;
+        printf(" %u:%d", (unsigned)(scene->unix_s + ahead_s), (int)price->point[k].milli_per_kWh);
+    }
+    puts("");
+}
+
 static void take(taper_transfers_t *transfers, const taper_frame_t *frame) {
-    static taper_limit_curve_t curve;
-    uint8_t connector = 0;
+    static taper_transfer_content_t content;
     const taper_transfer_scene_t scene = {.now_ms = now_ms(),
                                           .clock_is_set = true,
                                           .unix_s = (uint32_t)time(NULL),
                                           .time_scale = 1,
                                           .events = &events};
-    switch (taper_transfers_take(transfers, frame, &scene, &curve, &connector)) {
+    switch (taper_transfers_take(transfers, frame, &scene, &content)) {
     case TAPER_RESULT_CURVE:
-        print_curve(&curve, &scene);
+        print_curve(&content.curve, &scene);
+        taper_transfers_answer(transfers, TAPER_ANSWER_ACCEPTED, scene.now_ms);
+        break;
+    case TAPER_RESULT_PRICE:
+        print_price(&content.price, &scene);
         taper_transfers_answer(transfers, TAPER_ANSWER_ACCEPTED, scene.now_ms);
         break;
     case TAPER_RESULT_IDENTIFIER:
-        printf("identifier %u %s\n", connector, taper_transfers_identifier(transfers, connector));
+        printf("identifier %u %s\n", content.connector,
+               taper_transfers_identifier(transfers, content.connector));
         break;
     case TAPER_RESULT_REFUSED: puts("refused"); break;
     case TAPER_RESULT_NONE: break;

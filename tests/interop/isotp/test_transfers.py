@@ -12,7 +12,7 @@ import pytest
 from conftest import INTERFACE, other_end, running, transfer
 
 ACCEPTED, CRC, VERSION, CONTENT = 0, 1, 2, 3
-LIMIT_CURVE, IDENTIFIER, LOG_REQUEST, LOG, ANSWER = 1, 3, 5, 6, 7
+LIMIT_CURVE, PRICE_CURVE, IDENTIFIER, LOG_REQUEST, LOG, ANSWER = 1, 2, 3, 5, 6, 7
 
 
 def end_of(node: int):
@@ -22,6 +22,11 @@ def end_of(node: int):
 def curve(points: list[tuple[int, int]]) -> bytes:
     """(Unix time [s], limit [100 W])."""
     return transfer(LIMIT_CURVE, len(points), b"".join(struct.pack("<IH", *point) for point in points))
+
+
+def price_curve(points: list[tuple[int, int]]) -> bytes:
+    """(Unix time [s], price [1/1000 per kWh])."""
+    return transfer(PRICE_CURVE, len(points), b"".join(struct.pack("<Ih", *point) for point in points))
 
 
 def answer(code: int) -> bytes:
@@ -40,6 +45,27 @@ def test_a_limit_curve_arrives_point_by_point(count: int) -> None:
     for word, (unix_s, limit) in zip(words[2:], points, strict=True):
         at_s, watts = map(int, word.split(":"))
         assert abs(at_s - unix_s) <= 1 and watts == 100 * limit
+
+
+@pytest.mark.parametrize("count", (1, 200))
+def test_a_price_curve_arrives_point_by_point(count: int) -> None:
+    start = int(time.time()) + 1000
+    points = [(start + 900 * k, 40 - k) for k in range(count)]
+    with running("transfers") as peer, end_of(62) as gateway:
+        gateway.send(price_curve(points))
+        assert gateway.receive() == answer(ACCEPTED)
+        words = peer.line().split()
+    assert words[:2] == ["price", str(count)]
+    for word, (unix_s, price) in zip(words[2:], points, strict=True):
+        at_s, milli = map(int, word.split(":"))
+        assert abs(at_s - unix_s) <= 1 and milli == price
+
+
+def test_a_price_that_is_absent_is_refused() -> None:
+    with running("transfers") as peer, end_of(62) as gateway:
+        gateway.send(price_curve([(int(time.time()), -0x8000)]))
+        assert gateway.receive() == answer(CONTENT)
+        assert peer.line() == "refused"
 
 
 def test_the_example_of_the_document_works(capsys: pytest.CaptureFixture[str]) -> None:

@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "scene.h"
 #include "taper/stations.h"
 #include "unity.h"
 
@@ -58,7 +59,9 @@ void live_bench_start(const live_options_t *options, const sim_session_t *sessio
     live_bench_end();
     memset(&live, 0, sizeof live);
     const uint32_t scale = options->time_scale == 0 ? 1 : options->time_scale;
-    live.config = *find_station(options->station == NULL ? "hub" : options->station);
+    const taper_station_config_t *described =
+        find_station(options->station == NULL ? "hub" : options->station);
+    live.config = *(options->as_described ? described : scene_free_moving(described));
     live.config.tick_ms *= scale;
     live.now_ms = 1000;
     memcpy(live.session, sessions, count * sizeof sessions[0]);

@@ -23,6 +23,8 @@ typedef struct {
     uint32_t time_scale;                 /**< of station and field; 0 is 1 */
     uint32_t vehicle_delay_ms, grace_ms; /**< as in sim_field_options_t */
     bool no_gateway;
+    bool
+        as_described; /**< setpoints move, vehicles react and fall back as the station describes; else freely */
     uint64_t seed;
 } live_options_t;
 

@@ -91,3 +91,19 @@ uint32_t scene_random(uint32_t *state) {
     *state ^= *state << 5;
     return *state;
 }
+
+const taper_station_config_t *scene_free_moving(const taper_station_config_t *station) {
+    static taper_station_config_t copy;
+    static taper_connector_config_t copies[TAPER_MAX_CONNECTORS];
+    copy = *station;
+    for (uint8_t i = 0; i < station->connector_count; i++) {
+        copies[i] = station->connectors[i];
+        copies[i].fallback_mA = 0;
+        copies[i].reaction_ms = 0;
+    }
+    copy.connectors = copies;
+    copy.change_ms = 0;
+    copy.ramp_mA_per_s = 0;
+    copy.deadband_mA = 0;
+    return &copy;
+}

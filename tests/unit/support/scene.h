@@ -22,4 +22,10 @@ taper_proposal_t scene_proposal(int32_t wish_W);
 /** Next value of a small fixed pseudo-random generator (xorshift32); `state` must not be 0. */
 uint32_t scene_random(uint32_t *state);
 
+/**
+ * A copy of `station` whose setpoints move freely: no ramp, no deadband, no pause between changes, vehicles that follow at
+ * once, no fallback currents. For what is about something else. It is good until the next call.
+ */
+const taper_station_config_t *scene_free_moving(const taper_station_config_t *station);
+
 #endif

@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "scene.h"
 #include "taper/codec.h"
 #include "taper/stations.h"
 #include "unity.h"
@@ -19,8 +20,9 @@ unsigned bench_hub_index(void) {
 }
 
 taper_station_options_t bench_options(void) {
-    return (taper_station_options_t){
-        .config = taper_stations[bench_hub_index()], .port = &bench.port, .iterations_per_tick = 500};
+    return (taper_station_options_t){.config = scene_free_moving(taper_stations[bench_hub_index()]),
+                                     .port = &bench.port,
+                                     .iterations_per_tick = 500};
 }
 
 void bench_start(const taper_station_options_t *options) {

@@ -7,8 +7,7 @@
 
 taper_transfers_t transfers;
 taper_transfer_scene_t scene;
-taper_limit_curve_t curve;
-uint8_t connector;
+taper_transfer_content_t content;
 bench_peer_t gateway, tool;
 
 static taper_event_log_t events;
@@ -28,8 +27,7 @@ void bench_open_peer(bench_peer_t *peer, uint8_t bus, uint8_t node) {
 
 void bench_start(void) {
     memset(&events, 0, sizeof events);
-    memset(&curve, 0, sizeof curve);
-    connector = UINT8_MAX;
+    memset(&content, 0, sizeof content);
     scene = (taper_transfer_scene_t){.now_ms = BENCH_NOW_ms,
                                      .clock_is_set = true,
                                      .unix_s = BENCH_UNIX_s,
@@ -77,7 +75,7 @@ bool bench_from_peer(bench_peer_t *peer, taper_transfer_result_t *result) {
         return false;
     }
     taper_isotp_sent(&peer->link, scene.now_ms);
-    *result = taper_transfers_take(&transfers, &frame, &scene, &curve, &connector);
+    *result = taper_transfers_take(&transfers, &frame, &scene, &content);
     return true;
 }
 
@@ -105,7 +103,7 @@ taper_transfer_result_t bench_settle(bench_peer_t *peer) {
     while (anybody_busy(peer)) {
         taper_transfer_result_t result = TAPER_RESULT_NONE;
         (void)bench_from_peer(peer, &result);
-        if (result == TAPER_RESULT_CURVE) {
+        if (result == TAPER_RESULT_CURVE || result == TAPER_RESULT_PRICE) {
             taper_transfers_answer(&transfers, TAPER_ANSWER_ACCEPTED, scene.now_ms);
         }
         (void)bench_to_peer(peer);

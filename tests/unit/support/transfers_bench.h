@@ -9,9 +9,8 @@
 
 /** The station's end; everything that is a peer's is in its link. */
 extern taper_transfers_t transfers;
-extern taper_transfer_scene_t scene; /**< now_ms is the time of the bench */
-extern taper_limit_curve_t curve;    /**< of the last result CURVE */
-extern uint8_t connector;            /**< of the last result IDENTIFIER */
+extern taper_transfer_scene_t scene;     /**< now_ms is the time of the bench */
+extern taper_transfer_content_t content; /**< of the last result CURVE, PRICE or IDENTIFIER */
 
 /** A peer and what it got. */
 typedef struct {
@@ -42,7 +41,7 @@ bool bench_from_peer(bench_peer_t *peer, taper_transfer_result_t *result);
 /** One frame from the station, to whoever of gateway, tool and `peer` it is for. */
 bool bench_to_peer(bench_peer_t *peer);
 
-/** Move frames until all is quiet; a curve is answered with ACCEPTED. @return the last result other than NONE. */
+/** Move frames until all is quiet; a curve of limits or prices is answered with ACCEPTED. @return the last result other than NONE. */
 taper_transfer_result_t bench_settle(bench_peer_t *peer);
 
 /** Send a whole message and settle. */

@@ -6,14 +6,20 @@
  * each of them: so no sum exceeds a limit, whatever the proposal says. Where a group limits the imbalance of its phases,
  * currents on the stronger phases are lowered at the end until it holds. The guard recomputes all of it from nothing.
  *
- * Turns. A connector with a minimum current gets at least that or nothing. Where the minima of all that are wished for do
- * not fit, the order is: who was switched on less than `min_on_ms` ago; whose turn is not over (on for less than `turn_ms`);
- * who has waited for `turn_ms`, longest first; the rest by laxity, least first. Nobody is switched on within `min_off_ms` of
- * being switched off. So with places for K of M connectors nobody waits longer than ceil(M / K) turns and one
- * `min_off_ms`, while limits and wishes stay.
+ * Turns. A connector with a minimum current gets at least that or nothing. Minima come first, then what wishes and ceilings
+ * go beyond them, in the order of rank. Where the minima of all that are wished for do not fit, the order is: who was
+ * switched on less than `min_on_ms` ago; whose turn is not over (on for less than `turn_ms`); who has waited for `turn_ms`,
+ * longest first; the rest by laxity, least first. So when a limit falls, who can wait longest is shed first. Nobody is
+ * switched on within `min_off_ms` of being switched off. Whom only a ceiling calls for comes after all wishes.
  *
- * A wish below the minimum is followed over time: what is given is booked against what was wished, and the connector is
- * switched on while it is owed energy. The two differ by no more than the minimum for `min_on_ms` and one tick.
+ * If one minimum fits, somebody is on. With places for K of M connectors nobody waits longer than ceil(M / K) turns, one
+ * `min_off_ms`, and a tick per turn, while limits and wishes stay; a turn is the longer of `turn_ms` and `min_on_ms`. Where
+ * minima differ, room is kept for the first one that waited for a turn in vain, so that small ones do not shut it out.
+ *
+ * A wish below the minimum is followed over time: what is given is booked against what was wished. The connector is
+ * switched on when it is owed half the energy of the minimum for `min_on_ms`, and until it is owed none. The two differ by
+ * no more than the minimum for the longer of `min_on_ms` and `min_off_ms`, and one tick, while there is a place for it. It
+ * has the minimum besides, as all others, if its ceiling allows it and room is left over.
  */
 #ifndef TAPER_ALLOCATOR_H
 #define TAPER_ALLOCATOR_H
@@ -27,17 +33,20 @@
 typedef struct {
     bool on;
     bool switched; /**< `since_ms` is set: it was switched at least once in this session */
-    bool waits;    /**< it was to have current, and there was no place for its minimum */
+    uint8_t place; /**< among those that wait; 0: it does not */
     uint8_t session;
     uint32_t since_ms;   /**< of the last switch */
     uint32_t waiting_ms; /**< since when it waits */
-    int64_t owed_mWs;    /**< wished and not given; bounded by the minimum for `min_on_ms` */
+    int64_t
+        owed_mWs; /**< wished and not given; no further from 0 than the minimum for `min_on_ms` and a tick */
+    int64_t lacks_mW; /**< wished and not given since the last allocation; negative: given beyond the wish */
 } taper_turn_t;
 
 typedef struct {
     taper_turn_t turn[TAPER_MAX_CONNECTORS];
     bool started;
     uint32_t updated_ms; /**< time of the last snapshot */
+    uint8_t waiting;     /**< so many wait */
 } taper_allocator_t;
 
 /** Where a connector stands among those that wait: `place` 1.. of `of`; 0 of 0: it does not wait. */
@@ -52,24 +61,28 @@ void taper_allocator_init(taper_allocator_t *allocator);
  * Bound `proposal` by the limits of connectors, vehicles and groups; `supply` (negative counts as 0) bounds group 0
  * besides its own limits. `reserved_mA` [connectors] is kept free for connectors that are silent, but may still draw;
  * NULL: nothing. Times are those of the snapshot.
- * Cost: O(connectors x depth of the tree), a few times, and O(connectors^2) comparisons at worst for the order.
+ * Cost: O(connectors x depth of the tree), a few times, and O(connectors^2) comparisons at worst for the order. Stack: about
+ * 60 bytes per connector and 220 per group.
  */
 void taper_allocate(taper_allocator_t *allocator, const taper_station_config_t *config,
                     const taper_snapshot_t *snapshot, const taper_proposal_t *proposal,
                     const taper_supply_t *supply, const int32_t *reserved_mA, taper_setpoints_t *setpoints);
 
-/** Who waits, by the last allocation: the first of them is switched on next. Cost: O(connectors). */
-taper_waiting_t taper_allocator_waiting(const taper_allocator_t *allocator,
-                                        const taper_station_config_t *config,
-                                        const taper_snapshot_t *snapshot, uint8_t connector);
+/** Who waits, by the last allocation, in the order in which they will be switched on. Cost: constant. */
+taper_waiting_t taper_allocator_waiting(const taper_allocator_t *allocator, uint8_t connector);
 
-/** Lower currents until no group's imbalance is above its limit. Nothing is raised; whatever it cuts to below its minimum
-    becomes 0. `rank`: who is served first is cut last. Cost: O(groups x connectors^2) at worst. */
+/**
+ * Lower currents until no group's imbalance is above its limit: of those on its strongest phase and not on its weakest one,
+ * first who is on one phase, from the end of `rank` up, down to the minimum; only if that is not enough, to 0. Nothing is
+ * raised. `rank` is [connectors]; whom it does not name is cut first. Cost: O(groups), and while a group tilts at most
+ * connectors x 2 times O(connectors x depth).
+ */
 void taper_balance(const taper_station_config_t *config, const taper_snapshot_t *snapshot,
                    const uint8_t *rank, taper_setpoints_t *setpoints);
 
 /**
- * Whether `setpoints` hold every limit of connectors, groups, phases and imbalance, recomputed from nothing.
+ * Whether `setpoints` hold every limit of connectors, groups, phases and imbalance, recomputed from nothing. Currents of
+ * pairs of lines are added as phasors, in integers: what the rows bound from above, here is the current itself.
  * Cost: O(connectors + groups).
  */
 bool taper_guard_passes(const taper_station_config_t *config, const taper_snapshot_t *snapshot,

@@ -1,17 +1,21 @@
 /**
  * What vehicles really draw, against what they were told (docs/protocol.md, faults 41 to 43).
  *
- * | draws                                                  | for  | then                                              |
- * |--------------------------------------------------------|------|---------------------------------------------------|
- * | more than (setpoint + 0.5 A) x 1.10                    | at once | what it draws is booked                        |
- * | the same                                               | 7 s  | OVER: it gets nothing                             |
- * | more than 1 A, while OVER                              | 10 s | LOCKED: stop and open, nothing until it is unplugged |
- * | more than 1 A, after a setpoint of 0                   | 6 s  | LOCKED                                            |
- * | less than setpoint - 2 A                               | 60 s | its maximum becomes what it draws and 2 A more    |
- * | within 1 A of that maximum                             | at once | it has its own maximum again                   |
+ * | draws                                                  | for     | then                                              |
+ * |--------------------------------------------------------|---------|---------------------------------------------------|
+ * | more than (setpoint + 0.5 A) x 1.10                    | at once | what it draws is booked (ledger.h)                |
+ * | the same, and more than 1 A                            | 7 s     | OVER: it gets nothing                             |
+ * | more than 1 A, while OVER                              | 10 s    | LOCKED: stop and open, nothing until it is unplugged |
+ * | more than 1 A, after a setpoint of 0                   | 6 s     | LOCKED                                            |
+ * | at most 1 A, while OVER                                | 60 s    | NORMAL                                            |
+ * | less than setpoint - 2 A                               | 60 s    | its maximum becomes the most it drew meanwhile and 2 A more |
+ * | within 1 A of that maximum                             | at once | it has its own maximum again                      |
  *
- * OVER ends when it has drawn at most 1 A for TAPER_DRAW_CALM_ms. A setpoint counts as told from when it was sent; one that was lowered
- * binds only after the connector's `reaction_ms`: before, the highest of the last while does.
+ * A setpoint counts as told from when it was sent; one that was lowered binds only once the vehicle had its time to follow,
+ * and the connector is known to have it: before, `allowed_mA` is what is over-drawn or ignored. So who is out of reach and
+ * draws its fallback current does no wrong. While OVER, the pause that comes of it is judged by the 10 s alone.
+ *
+ * Times are the world's. While nothing is measured nothing is judged: what held at both ends is taken to have held between.
  */
 #ifndef TAPER_DRAW_H
 #define TAPER_DRAW_H
@@ -48,12 +52,18 @@ typedef struct {
     int32_t min_mA;      /**< least current that it can be offered */
 } taper_draw_report_t;
 
+/** A condition that may hold, and since when. */
+typedef struct {
+    bool holds;
+    uint32_t since_ms;
+} taper_draw_since_t;
+
 typedef struct {
     taper_draw_state_t state;
-    bool over, ignoring, flowing, unused, calm; /**< the condition holds since .._ms */
+    taper_draw_since_t over, ignoring, flowing, unused, calm;
     uint8_t session;
-    uint32_t over_ms, ignoring_ms, flowing_ms, unused_ms, calm_ms;
-    int32_t cap_mA; /**< most that is of use to it; TAPER_NO_LIMIT: its own maximum */
+    int32_t most_mA; /**< drawn while `unused` holds */
+    int32_t cap_mA;  /**< most that is of use to it, at least its minimum; TAPER_NO_LIMIT: its own maximum */
 } taper_draw_t;
 
 /** Nothing against it. */
@@ -62,7 +72,7 @@ void taper_draw_init(taper_draw_t *draw);
 /** Take in what is known at `now_ms`. @return whether the state or the cap changed. Cost: constant. */
 bool taper_draw_update(taper_draw_t *draw, const taper_draw_report_t *report, uint32_t now_ms);
 
-/** Most that a setpoint of `allowed_mA` may be over-drawn by before it counts: (allowed + 0.5 A) x 1.10. */
+/** Most that may be drawn by a setpoint of `allowed_mA` >= 0 before it counts: (allowed + 0.5 A) x 1.10. */
 int32_t taper_draw_tolerated_mA(int32_t allowed_mA);
 
 #endif

@@ -3,9 +3,11 @@
  *
  * - An increase comes no sooner than `change_ms` after the last change of that setpoint (IEC 61851-1: a vehicle has 5 s to
  *   follow a new duty cycle; DC connectors are exempt).
- * - It is no steeper than `ramp_mA_per_s`, counted for the time since the last change, but at most for the longer of
- *   `change_ms` and a control tick. The step from nothing to the minimum current is always allowed.
- * - One below `deadband_mA` waits, unless nothing changed for TAPER_SHAPE_SETTLE_ms.
+ * - It is no steeper than `ramp_mA_per_s`, counted for the time since the last change, but at most for the longest of
+ *   `change_ms`, a control tick, and what one step of the wire takes. The step from below the minimum current to it is
+ *   always allowed.
+ * - If what is missing to the target is below `deadband_mA`, it waits until nothing changed for TAPER_SHAPE_SETTLE_ms. That
+ *   keeps no connector off.
  *
  * Times are the world's (`snapshot->now_ms`).
  */

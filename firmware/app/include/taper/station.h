@@ -17,6 +17,7 @@
 #define TAPER_STATION_H
 
 #include "taper/allocator.h"
+#include "taper/draw.h"
 #include "taper/e2e.h"
 #include "taper/event.h"
 #include "taper/fallback.h"
@@ -24,7 +25,9 @@
 #include "taper/limits.h"
 #include "taper/planner.h"
 #include "taper/port.h"
+#include "taper/rows.h"
 #include "taper/session.h"
+#include "taper/shape.h"
 #include "taper/supervisor.h"
 #include "taper/transfers.h"
 #include "taper/types.h"
@@ -111,6 +114,23 @@ typedef struct {
     uint32_t next_ms;   /**< of the next EMCY */
 } taper_alarm_t;
 
+/** Connectors on the bus that the station has no place for, and that are noted (docs/protocol.md, fault 31). */
+#define TAPER_STRANGERS 8
+
+/** One of them; `node` 0: free. In the order of arrival. */
+typedef struct {
+    uint8_t bus, node;
+    uint8_t setpoint_counter, outlook_counter;
+    uint32_t heard_ms;
+} taper_stranger_t;
+
+/** How much energy a vehicle still gets, by the plan or else by its present power. */
+typedef struct {
+    uint32_t made_ms;   /**< time of the plan, in the world's */
+    int32_t planned_Wh; /**< within the horizon */
+    int32_t need_Wh;    /**< what it wanted then */
+} taper_prospect_t;
+
 /** What survives a restart. Written whole, two copies in turn. */
 typedef struct {
     uint32_t sequence;
@@ -127,8 +147,13 @@ typedef struct {
     taper_planner_t planner;
     taper_allocator_t allocator;
     taper_ledger_t ledger;
+    taper_shape_t shape;
+    taper_draw_t draw[TAPER_MAX_CONNECTORS];
+    taper_health_t health; /**< of the planner */
+    taper_self_t self;     /**< of this controller */
+    taper_stranger_t stranger[TAPER_STRANGERS];
     taper_transfers_t transfers;
-    taper_limit_curve_t incoming_curve; /**< being taken over from a transfer */
+    taper_transfer_content_t incoming; /**< being taken over from a transfer */
     taper_trouble_t refused_transfers;
     taper_event_log_t events;
     taper_e2e_receiver_t connector_e2e[TAPER_MAX_CONNECTORS][TAPER_CONNECTOR_RECEIVERS];
@@ -149,9 +174,11 @@ typedef struct {
     uint8_t outlook_counter[TAPER_MAX_CONNECTORS];
     uint8_t setpoint_session[TAPER_MAX_CONNECTORS]; /**< whom the setpoints were decided for */
     int32_t sent_mA[TAPER_MAX_CONNECTORS];          /**< what was last sent; negative: nothing that counts */
-    uint8_t sent_session[TAPER_MAX_CONNECTORS];     /**< and for whom */
-    uint32_t sent_ms[TAPER_MAX_CONNECTORS];         /**< and when */
-    bool status_due[TAPER_MAX_BUSES];               /**< the CTRL_STATUS of this tick is not out yet */
+    int32_t sent_fallback_mA[TAPER_MAX_CONNECTORS];
+    uint8_t sent_command[TAPER_MAX_CONNECTORS];
+    uint8_t sent_session[TAPER_MAX_CONNECTORS]; /**< and for whom */
+    uint32_t sent_ms[TAPER_MAX_CONNECTORS];     /**< and when */
+    bool status_due[TAPER_MAX_BUSES];           /**< the CTRL_STATUS of this tick is not out yet */
     uint8_t status_counter[TAPER_MAX_BUSES];
     uint8_t diag_counter[TAPER_MAX_BUSES];
     uint8_t emcy_counter[TAPER_MAX_BUSES];
@@ -168,8 +195,15 @@ typedef struct {
     taper_snapshot_t snapshot;   /**< of the last step */
     taper_proposal_t proposal;   /**< of the last step */
     taper_setpoints_t target;    /**< of the last step: what holds every limit once all have followed */
+    taper_setpoints_t shaped;    /**< of that, what may be told by now (shape.h) */
     taper_setpoints_t setpoints; /**< what is sent: of that, what is paid for */
-    uint32_t last_solve_us;      /**< wall time of the last finished solve, by the port's clock_us */
+    taper_setpoints_t fallback;  /**< fallback currents that go with them */
+    taper_setpoints_t inverse, fallback_inverse;        /**< of these two, bit by bit: fault 48 */
+    int64_t row_sum[TAPER_MAX_GROUPS][TAPER_ROW_KINDS]; /**< of the targets: mW, uA */
+    taper_prospect_t prospect[TAPER_MAX_CONNECTORS];
+    uint32_t stepped_ms; /**< time of the last step */
+    bool stepped;
+    uint32_t last_solve_us; /**< wall time of the last finished solve, by the port's clock_us */
     taper_station_counters_t counters;
 } taper_station_t;
 
@@ -197,11 +231,19 @@ void taper_station_poll(taper_station_t *station, uint32_t now_ms);
 void taper_station_stop(taper_station_t *station, uint32_t now_ms);
 
 /**
- * Replace the known course of the site limit. Times are on the world's clock (`now_ms` times the time scale), within 24
- * days; the curve is copied. It can only lower the site limit that the configuration and the gateway give.
+ * Replace the site's own known course of its limit, beside that of the gateway; the least counts. Times are on the world's
+ * clock (`now_ms` times the time scale), within 24 days; the curve is copied. It can only lower the site limit that the
+ * configuration and the gateway give.
  * @return TAPER_ERR_ARGUMENT for too many points, times not ascending, or a negative limit; the old curve stays then.
  */
 taper_status_t taper_station_set_limit_curve(taper_station_t *station, const taper_limit_curve_t *curve);
+
+/**
+ * Replace the known course of the price of energy; times as above. It counts as far as `price_weight_permille` of the
+ * configuration says.
+ * @return TAPER_ERR_ARGUMENT for too many points, or times not ascending; the old one stays then.
+ */
+taper_status_t taper_station_set_price_curve(taper_station_t *station, const taper_price_curve_t *curve);
 
 /** The event log. `count` only grows: a reader remembers how far it has read. */
 const taper_event_log_t *taper_station_events(const taper_station_t *station);

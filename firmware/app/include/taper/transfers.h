@@ -1,5 +1,5 @@
 /**
- * What goes over ISO-TP, and what becomes of it: the limit curve from the gateway, identifiers of vehicles from their
+ * What goes over ISO-TP, and what becomes of it: limit and price curves from the gateway, identifiers of vehicles from their
  * connectors, and the event log to a tool. A transfer has a header of its own and a CRC-32 over all of it; it is used when
  * it is whole and right in every point, or not at all. No hard limit depends on it.
  *
@@ -8,6 +8,8 @@
  *     byte 0 version (1), byte 1 type (taper_transfer_type_t), bytes 2-3 count of items, items, 4 bytes CRC-32 (IEEE 802.3)
  *
  *     LIMIT_CURVE    gateway -> station   items of 6 bytes: Unix time [s] u32, limit u16 x 100 W; times ascending
+ *     PRICE_CURVE    gateway -> station   items of 6 bytes: Unix time [s] u32, price s16 in 1/1000 of the currency's unit per
+ *                                         kWh, not 0x8000; times ascending
  *     IDENTIFIER     connector -> station items of 1 byte: printable ASCII, 1..TAPER_IDENTIFIER_LENGTH; empty: forget it
  *     LOG_REQUEST    tool -> station      no items
  *     LOG            station -> tool      items of 16 bytes: time_ms u32, unix_s u32, data i32, code, bus, node, 0
@@ -44,6 +46,7 @@
 
 typedef enum {
     TAPER_TRANSFER_LIMIT_CURVE = 1,
+    TAPER_TRANSFER_PRICE_CURVE = 2,
     TAPER_TRANSFER_IDENTIFIER = 3,
     TAPER_TRANSFER_LOG_REQUEST = 5,
     TAPER_TRANSFER_LOG = 6,
@@ -78,10 +81,17 @@ typedef struct {
 /** What a whole transfer brought. */
 typedef enum {
     TAPER_RESULT_NONE,
-    TAPER_RESULT_CURVE,      /**< the curve is in `curve` */
-    TAPER_RESULT_IDENTIFIER, /**< the identifier of `connector` was told */
+    TAPER_RESULT_CURVE,      /**< the limits are in `content->curve` */
+    TAPER_RESULT_PRICE,      /**< the prices are in `content->price` */
+    TAPER_RESULT_IDENTIFIER, /**< the identifier of `content->connector` was told */
     TAPER_RESULT_REFUSED,    /**< torn, corrupt or not valid; nothing changed */
 } taper_transfer_result_t;
+
+typedef union {
+    taper_limit_curve_t curve;
+    taper_price_curve_t price;
+    uint8_t connector;
+} taper_transfer_content_t;
 
 /** No transfer under way, no identifier known. `config` must outlive it. */
 void taper_transfers_init(taper_transfers_t *transfers, const taper_station_config_t *config);
@@ -97,10 +107,12 @@ typedef struct {
 
 /**
  * Take in a frame of function ISOTP_FROM (from gateway, tool or a connector of the station); others are left alone. When
- * it completes a curve, `*curve` is filled, with times on the station's world clock (`now_ms * time_scale`, wrapping);
- * points past are merged into one of now. No point is more than TAPER_CURVE_SPAN_ms ahead, and a curve without points is
- * one too: nothing is known any more. The curve counts as accepted only after taper_transfers_answer(); until then
- * `*curve` is the caller's, and nothing here remembers it. `*curve` and `*connector` are not touched otherwise.
+ * it completes a curve, `*content` is filled, with times on the station's world clock (`now_ms * time_scale`, wrapping);
+ * points past are merged into one of now. (If all prices are past, the last keeps its time: the end of a price counts from
+ * there; more than TAPER_PRICE_HOLDS_ms ago is as good as two hours.) No point is more than TAPER_CURVE_SPAN_ms ahead, and a
+ * curve without points is one too: nothing is known any more. The curve counts as accepted only after
+ * taper_transfers_answer(); until then it is the caller's, and nothing here remembers it. `*content` is not touched unless
+ * the result says what is in it.
  *
  * The connectors share one link. While it is with one of them, the others are not heard: ISO-TP lets them run into their
  * timeout, and they have to try again.
@@ -108,8 +120,8 @@ typedef struct {
  * Cost: O(bytes of the message) for the frame that completes it, O(connectors) for the first of a connector.
  */
 taper_transfer_result_t taper_transfers_take(taper_transfers_t *transfers, const taper_frame_t *frame,
-                                             const taper_transfer_scene_t *scene, taper_limit_curve_t *curve,
-                                             uint8_t *connector);
+                                             const taper_transfer_scene_t *scene,
+                                             taper_transfer_content_t *content);
 
 /** Tell the gateway what became of its curve. */
 void taper_transfers_answer(taper_transfers_t *transfers, taper_transfer_answer_t answer, uint32_t now_ms);

@@ -1,15 +1,7 @@
 /**
  * The supervisor: which proposal is used, whether the planner is asked at all, and whether this controller still trusts
- * itself. Modes, deadlines and ways back are one table, in supervisor.c; every row is left by itself as soon as its
- * condition ends, and nothing is remembered but what stands in the structs below.
- *
- * | condition, the first that holds                      | mode     | deadline          | way back                      |
- * |------------------------------------------------------|----------|-------------------|-------------------------------|
- * | gateway never heard, at most TAPER_INIT_ms since the start | INIT | TAPER_INIT_ms | its first limit               |
- * | gateway never heard, or silent for too long          | FAILSAFE | same tick         | a limit (limits.h)            |
- * | the last tick took too long                          | FALLBACK | next tick         | a tick in time                |
- * | no usable proposal: none yet, late, not finite, refused, off | FALLBACK | same tick | the next good plan            |
- * | otherwise                                            | PLAN     | -                 |                               |
+ * itself. Conditions, modes, deadlines and ways back are one table, in supervisor.c. Every row is left by itself as soon as
+ * its condition ends, and nothing is remembered but what stands in the structs below.
  */
 #ifndef TAPER_SUPERVISOR_H
 #define TAPER_SUPERVISOR_H
@@ -55,27 +47,32 @@ typedef struct {
     uint32_t off_ms; /**< since when */
 } taper_health_t;
 
-/** An answer came at `now_ms`. @return whether it turned the planner off. */
+/** An answer came at `now_ms`; while the planner is off, it does not count. @return whether it turned the planner off. */
 bool taper_health_judge(taper_health_t *health, bool usable, uint32_t now_ms);
 
 /** Whether the planner may be asked at `now_ms`. After TAPER_PLANNER_OFF_ms it may again, and one more bad answer turns
-    it off. @return false while it is off. */
+    it off; a good one makes it trusted. Ask in every tick: the time off must not come round with the clock.
+    @return false while it is off. */
 bool taper_health_may_plan(taper_health_t *health, uint32_t now_ms);
 
 /** Faults of this controller itself. Zero-initialised: none. */
 typedef struct {
     bool overran;     /**< the last tick did */
-    uint8_t overruns; /**< in a row */
+    uint8_t overruns; /**< in a row; stays at TAPER_RESET_OVERRUNS once it was reached */
     uint8_t flips;    /**< setpoints that differed from their inverse, ever, up to TAPER_RESET_FLIPS */
 } taper_self_t;
 
-/** A tick took `took_ms` of `tick_ms`. @return whether that is too long. */
-bool taper_self_ticked(taper_self_t *self, uint32_t took_ms, uint32_t tick_ms);
+/**
+ * A tick began `late_ms` late: so much longer than `tick_ms` took the one before, or what ran beside it. More than half a
+ * tick is too long: setpoints are to be on the bus half a tick late at the latest (docs/protocol.md, Faults).
+ * @return whether it was too long.
+ */
+bool taper_self_ticked(taper_self_t *self, uint32_t late_ms, uint32_t tick_ms);
 
 /** A setpoint differed from its inverse. */
 void taper_self_flipped(taper_self_t *self);
 
-/** Whether the watchdog is to be kicked: false once this controller should rather be restarted. */
+/** Whether the watchdog is to be kicked. Once it is not, it never is again: this controller is to be restarted. */
 bool taper_self_is_sound(const taper_self_t *self);
 
 #endif

@@ -164,6 +164,7 @@ typedef struct {
     bool active;             /**< a vehicle is there, is sound, and still wants energy */
     bool soc_estimated;      /**< `stored_Wh` rests on measured energy because the reported SOC is stale */
     uint8_t session;         /**< wire number of the session on this connector */
+    uint8_t conductors;      /**< phases of the connector that the vehicle may use: 1..3 */
     int32_t stored_Wh;       /**< energy in the battery, >= 0; 0 if SOC or capacity is unknown */
     int32_t capacity_Wh;     /**< > 0, or 0: unknown (no taper then) */
     int32_t need_Wh;         /**< energy still wanted, > 0 */
@@ -209,7 +210,7 @@ typedef struct {
     int32_t milli_per_kWh;
 } taper_price_point_t;
 
-/** Known course of the price, times ascending. Before its first point, and 24 h after its last, it says nothing. */
+/** Known course of the price, times ascending. Before its first point, and an hour after its last, it says nothing. */
 typedef struct {
     uint16_t count;
     taper_price_point_t point[TAPER_MAX_PRICE_POINTS];
@@ -220,8 +221,8 @@ typedef struct {
     int32_t limit_W[TAPER_MAX_STEPS]; /**< of the site, for charging, >= 0 */
     uint8_t source[TAPER_MAX_STEPS];  /**< taper_limit_source_t: whose limit it is */
     int32_t phase_mA[3]; /**< as in taper_supply_t: what other load leaves now is taken to last */
-    bool priced;         /**< the price of every step is known */
-    int32_t milli_per_kWh[TAPER_MAX_STEPS];
+    bool priced;         /**< the prices of enough steps are known; those of others are their mean (limits.h) */
+    int32_t milli_per_kWh[TAPER_MAX_STEPS]; /**< 0 unless `priced` */
 } taper_course_t;
 
 /**

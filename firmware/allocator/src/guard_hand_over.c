@@ -1,0 +1,193 @@
+/*
+ * The last gate of the hand-over and of the fallback currents. It shares no code with rooms, grants and rows on purpose: one
+ * mistake must not blind both. What rows bound by sums, it takes as the length of the phasor where currents flow between
+ * two lines; currents to neutral are added, as in the rows.
+ */
+#include "taper/ledger.h"
+
+#define LINES 3u
+
+/** What connectors below a group draw: power, current to neutral by line, and between lines L1-L2, L2-L3, L3-L1. */
+typedef struct {
+    int64_t power_mW;
+    int64_t line_uA[LINES];
+    int64_t pair_uA[LINES];
+} load_t;
+
+static int32_t power_W_per_A(const taper_connector_config_t *connector, const taper_demand_t *demand) {
+    int32_t W_per_A = demand->W_per_A;
+    if (demand->booking.phases != 0) {
+        return demand->booking.W_per_A;
+    }
+    if (!demand->active) {
+        W_per_A = (connector->voltage_mV + 999) / 1000 * connector->phases;
+        if (connector->is_dc) {
+            const int32_t efficiency = connector->efficiency_permille;
+            W_per_A = (W_per_A * 1000 + efficiency - 1) / efficiency;
+        }
+    }
+    return W_per_A > demand->booking.W_per_A ? W_per_A : demand->booking.W_per_A;
+}
+
+/** Lines that a connector is wired to by its description: bit 0 L1 .. bit 2 L3. */
+static unsigned wired_lines(const taper_connector_config_t *connector) {
+    static const uint8_t first[] = {1, 1, 2, 4,
+                                    1, 2, 4}; /* of rotations unknown, 123, 231, 312, 132, 213, 321 */
+    static const uint8_t second[] = {2, 2, 4, 1, 4, 1, 2};
+    if (connector->is_dc || connector->phases == LINES) {
+        return 7;
+    }
+    return first[connector->rotation] | (connector->line_to_line ? second[connector->rotation] : 0u);
+}
+
+/** Current in its supply for 1000 A of setpoint. */
+static int32_t supply_permille(const taper_station_config_t *config,
+                               const taper_connector_config_t *connector) {
+    if (!connector->is_dc) {
+        return 1000;
+    }
+    const int32_t volts = (connector->voltage_mV + 999) / 1000;
+    const int32_t W_per_A =
+        (volts * 1000 + connector->efficiency_permille - 1) / connector->efficiency_permille;
+    const int64_t site_mV = 3 * (int64_t)config->site_voltage_mV;
+    return (int32_t)((W_per_A * INT64_C(1000000) + site_mV - 1) / site_mV);
+}
+
+static void add_current(load_t *load, unsigned lines, bool between_lines, int64_t current_uA) {
+    if (between_lines && (lines == 3u || lines == 6u || lines == 5u)) {
+        load->pair_uA[lines == 3u ? 0 : lines == 6u ? 1 : 2] += current_uA;
+        return;
+    }
+    for (unsigned line = 0; line < LINES; line++) {
+        load->line_uA[line] += (lines >> line & 1u) != 0 ? current_uA : 0;
+    }
+}
+
+static void add_connector(const taper_station_config_t *config, const taper_demand_t *demand, uint8_t i,
+                          int32_t current_mA, load_t *load) {
+    const taper_connector_config_t *connector = &config->connectors[i];
+    load->power_mW += (int64_t)current_mA * power_W_per_A(connector, demand);
+    if (demand->booking.phases != 0) {
+        add_current(load, demand->booking.phases, demand->booking.line_to_line,
+                    (int64_t)current_mA * demand->booking.permille);
+    } else {
+        add_current(load, wired_lines(connector), connector->line_to_line,
+                    (int64_t)current_mA * supply_permille(config, connector));
+    }
+}
+
+/** Loads per group, a child's in its parent's. */
+static void add_up(const taper_station_config_t *config, const taper_snapshot_t *snapshot,
+                   const int32_t *current_mA, load_t *load) {
+    for (uint8_t k = 0; k < config->group_count; k++) {
+        load[k] = (load_t){0};
+    }
+    for (uint8_t i = 0; i < config->connector_count; i++) {
+        add_connector(config, &snapshot->demand[i], i, current_mA[i], &load[config->connectors[i].group]);
+    }
+    for (uint8_t k = config->group_count; k-- > 1;) { /* children stand behind their parents */
+        load_t *parent = &load[config->groups[k].parent];
+        parent->power_mW += load[k].power_mW;
+        for (unsigned line = 0; line < LINES; line++) {
+            parent->line_uA[line] += load[k].line_uA[line];
+            parent->pair_uA[line] += load[k].pair_uA[line];
+        }
+    }
+}
+
+/** Root of a square below 2^62, rounded up. */
+static int64_t root(int64_t square) {
+    int64_t below = -1; /* the greatest whose own square is smaller */
+    for (int64_t bit = INT64_C(1) << 31; bit != 0; bit /= 2) {
+        const int64_t trial = below + bit;
+        below = trial * trial < square ? trial : below;
+    }
+    return below + 1;
+}
+
+static int64_t whole_mA(int64_t current_uA) {
+    return (current_uA + 999) / 1000;
+}
+
+/** Current of a line. Pairs are 60 degrees apart where they meet: sqrt(x^2 + x y + y^2). */
+static int64_t line_uA(const load_t *load, unsigned line) {
+    const int64_t x_mA = whole_mA(load->pair_uA[line]);
+    const int64_t y_mA = whole_mA(load->pair_uA[(line + 2u) % LINES]);
+    return load->line_uA[line] + 1000 * root(x_mA * x_mA + x_mA * y_mA + y_mA * y_mA);
+}
+
+/** Current of a line on the delta side, times the ratio of windings: pairs add up to AB + BC - 2 CA, 120 degrees apart. */
+static int64_t delta_uA(const load_t *load, unsigned line) {
+    const int64_t a_mA = whole_mA(load->pair_uA[line]);
+    const int64_t b_mA = whole_mA(load->pair_uA[(line + 1u) % LINES]);
+    const int64_t c_mA = whole_mA(2 * load->pair_uA[(line + 2u) % LINES]);
+    const int64_t square = a_mA * a_mA + b_mA * b_mA + c_mA * c_mA - a_mA * b_mA + a_mA * c_mA + b_mA * c_mA;
+    return load->line_uA[line] + load->line_uA[(line + 2u) % LINES] + 1000 * root(square);
+}
+
+/** Whether what was `before` and is `after` now, in thousandths, may be: within the limit, or no more. */
+static bool may_be(int64_t before, int64_t after, int32_t limit) {
+    return after <= before || after <= (int64_t)(limit > 0 ? limit : 0) * 1000;
+}
+
+static bool lines_pass(const taper_group_config_t *group, const int32_t *supply_mA, const load_t *before,
+                       const load_t *after) {
+    for (unsigned line = 0; line < LINES; line++) {
+        const int32_t limit_mA = group->limit_mA < supply_mA[line] ? group->limit_mA : supply_mA[line];
+        if (group->limit_mA != 0 && !may_be(line_uA(before, line), line_uA(after, line), limit_mA)) {
+            return false;
+        }
+        if (group->delta_mA != 0 && !may_be(delta_uA(before, line), delta_uA(after, line), group->delta_mA)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static bool group_passes(const taper_group_config_t *group, const taper_supply_t *supply,
+                         const load_t *before, const load_t *after) {
+    const int32_t limit_W = group->limit_W < supply->site_W ? group->limit_W : supply->site_W;
+    return (group->limit_W == 0 || may_be(before->power_mW, after->power_mW, limit_W)) &&
+           lines_pass(group, supply->phase_mA, before, after);
+}
+
+bool taper_guard_hand_over_passes(const taper_ledger_t *ledger, const taper_station_config_t *config,
+                                  const taper_snapshot_t *snapshot, const taper_supply_t *supply,
+                                  const taper_setpoints_t *granted) {
+    const taper_supply_t described = taper_supply_of_W(INT32_MAX);
+    int32_t current_mA[TAPER_MAX_CONNECTORS] = {0};
+    load_t before[TAPER_MAX_GROUPS];
+    load_t after[TAPER_MAX_GROUPS];
+    for (uint8_t i = 0; i < config->connector_count; i++) {
+        current_mA[i] = taper_ledger_may_mA(ledger, i);
+    }
+    add_up(config, snapshot, current_mA, before);
+    for (uint8_t i = 0; i < config->connector_count; i++) {
+        current_mA[i] = granted->current_mA[i] > current_mA[i] ? granted->current_mA[i] : current_mA[i];
+    }
+    add_up(config, snapshot, current_mA, after);
+    for (uint8_t k = 0; k < config->group_count; k++) {
+        if (!group_passes(&config->groups[k], k == 0 ? supply : &described, &before[k], &after[k])) {
+            return false;
+        }
+    }
+    return true;
+}
+
+bool taper_guard_fallback_passes(const taper_ledger_t *ledger, const taper_station_config_t *config,
+                                 const taper_snapshot_t *snapshot, int32_t failsafe_W,
+                                 const taper_setpoints_t *granted, const taper_setpoints_t *fallback) {
+    int64_t before_mW = 0;
+    int64_t after_mW = 0;
+    for (uint8_t i = 0; i < config->connector_count; i++) {
+        const int32_t W_per_A = power_W_per_A(&config->connectors[i], &snapshot->demand[i]);
+        const int32_t before_mA = taper_ledger_fallback_mA(ledger, i);
+        const int32_t told_mA = fallback->current_mA[i];
+        if (told_mA < 0 || told_mA > granted->current_mA[i]) {
+            return false;
+        }
+        before_mW += (int64_t)W_per_A * before_mA;
+        after_mW += (int64_t)W_per_A * (told_mA > before_mA ? told_mA : before_mA);
+    }
+    return may_be(before_mW, after_mW, failsafe_W);
+}
