@@ -51,7 +51,7 @@ typedef enum {
     RULE_CURRENT,       /**< neither 0 nor within minimum and maximum */
     RULE_VALIDITY,      /**< not the documented one */
     RULE_TOLD_FALLBACK, /**< above the setpoint or the description, or between 0 and the minimum */
-    RULE_PHASES,        /**< the mask is not that of the connector */
+    RULE_PHASES,        /**< the mask names other conductors than the connector uses, or has */
     RULE_SESSION,       /**< current for a session that the connector did not tell, or for nobody */
     RULES,
 } rule_t;
@@ -97,6 +97,7 @@ typedef struct {
     bool told_vehicle; /**< by the last EVSE_STATUS that reached the station */
     int64_t told_vehicle_ms;
     uint8_t told_conductors; /**< or seen to carry current */
+    uint8_t tick_conductors; /**< the same at the last control tick */
     uint8_t told_session[2]; /**< by EV_PARAM_A: the last, and the one before */
 
     bool wants;

@@ -192,6 +192,7 @@ void account_tick(account_t *account, bool all_taken) {
     loads_t sent;
     memset(&sent, 0, sizeof sent);
     for (unsigned i = 0; i < account->config->connector_count; i++) {
+        account->book[i].tick_conductors = account->book[i].told_conductors;
         all_taken = all_taken && account->now_ms - account->book[i].sent_ms <= SENT_LATELY_ms;
         add_equally(&sent, account, i, conductors_told(account, i), account->book[i].sent_mA);
     }

@@ -23,6 +23,22 @@ static bool in_range(int32_t value, int32_t least, int32_t most) {
     return value == 0 || (value >= least && value <= most);
 }
 
+static unsigned least(unsigned a, unsigned b) {
+    return a < b ? a : b;
+}
+
+/** With a current: the conductors that the connector uses, by what the station has heard now or in its last tick. */
+static void judge_phases(account_t *account, unsigned connector, const wire_setpoint_t *setpoint) {
+    const book_t *book = &account->book[connector];
+    const unsigned wired = account->config->connectors[connector].phases;
+    const unsigned conductors = setpoint->phase_mask == 7 ? 3 : setpoint->phase_mask == 3 ? 2 : 1;
+    const bool whole = setpoint->phase_mask == (1u << conductors) - 1u && conductors <= wired;
+    const bool used = conductors == least(wired, book->told_conductors) ||
+                      conductors == least(wired, book->tick_conductors);
+    expect(account, connector, RULE_PHASES, whole && (used || setpoint->current_mA == 0),
+           book->told_conductors, setpoint->phase_mask);
+}
+
 static void judge_currents(account_t *account, unsigned connector, const wire_setpoint_t *setpoint) {
     const taper_connector_config_t *config = &account->config->connectors[connector];
     const bool charges = setpoint->command == WIRE_CHARGE;
@@ -38,8 +54,7 @@ static void judge_currents(account_t *account, unsigned connector, const wire_se
            in_range(setpoint->fallback_mA, config->min_mA, config->fallback_mA) &&
                setpoint->fallback_mA <= setpoint->current_mA,
            setpoint->current_mA, setpoint->fallback_mA);
-    const unsigned mask = config->phases == 3 ? 7 : 1;
-    expect(account, connector, RULE_PHASES, setpoint->phase_mask == mask, mask, setpoint->phase_mask);
+    judge_phases(account, connector, setpoint);
 }
 
 static void judge_session(account_t *account, unsigned connector, const wire_setpoint_t *setpoint) {

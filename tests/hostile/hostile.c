@@ -135,16 +135,19 @@ int main(int count, char **words) {
         return 2;
     }
     const int64_t start_ms = world.now_ms;
-    while (world.tick < arguments.ticks && !world.account.verdict.failed) {
+    while (world.tick < arguments.ticks && !world.account.verdict.failed && world.guard_violations == 0) {
         world_tick(&world);
     }
     if (world.account.verdict.failed) {
         print_failure(&arguments, start_ms);
+    }
+    if (world.guard_violations > 0) {
+        printf("GUARD: the station's own guard found a violation in tick %" PRIu64 "\n", world.tick);
     }
     print_account(&arguments);
     const bool idle = world.tick >= LONG_RUN && charging_percent() < LEAST_CHARGING_percent;
     if (idle) {
         printf("NOTHING PROVED: hardly anybody was charged\n");
     }
-    return world.account.verdict.failed || idle ? 1 : 0;
+    return world.account.verdict.failed || world.guard_violations > 0 || idle ? 1 : 0;
 }

@@ -175,6 +175,8 @@ void world_tick(world_t *world) {
         run_poll(world, poll, world->now_ms - last_ms);
         last_ms = world->now_ms;
     }
+    world->guard_violations +=
+        world->station_dead ? 0 : taper_station_counter(&world->station, TAPER_COUNTER_GUARD_VIOLATIONS);
     world->now_ms = begin_ms + world->config->tick_ms;
     world->tick++;
 }

@@ -62,7 +62,8 @@ typedef struct {
     bool station_dead;
     uint64_t station_back; /**< tick */
     unsigned refuse_permille;
-    uint64_t refused_before; /**< frames that the bus had not taken, by the last tick */
+    uint64_t guard_violations; /**< 0, or a station's own guard had to step in: its allocator is wrong */
+    uint64_t refused_before;   /**< frames that the bus had not taken, by the last tick */
 
     node_t node[TAPER_MAX_CONNECTORS];
     gateway_t gateway;
