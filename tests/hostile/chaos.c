@@ -9,6 +9,7 @@
 #define FAIR_PLACES 2
 /* Setpoints of before the turns are over, and connectors that were switched off may be on again. */
 #define FAIR_SETTLES 60u
+#define FAIR_PLUGGED 50u /* that long before */
 #define FAIR_TICKS   900u
 /* From one connector to the next: its vehicle's reaction, the hand-over, ticks. */
 #define HAND_OVER_ms 15000
@@ -166,31 +167,52 @@ static void trouble_sender(world_t *world) {
     }
 }
 
-/** Everybody wants, and the minima of FAIR_PLACES fit. */
+static int64_t fair_bound_ms(const world_t *world) {
+    const taper_station_config_t *config = world->config;
+    const int64_t turns = (config->connector_count + FAIR_PLACES - 1) / FAIR_PLACES;
+    return turns * ((int64_t)config->turn_ms + HAND_OVER_ms) + config->min_off_ms;
+}
+
+/** A vehicle that wants as much as it can have. */
+static void plug_hungry(world_t *world, unsigned i) {
+    node_t *node = &world->node[i];
+    node_plug(node, LIE_NONE);
+    node->absurd = false;
+    node->pauses = false;
+    node->info_odd = false;
+    node->own_mA = node->config->max_mA;
+    node->min_mA = node->config->min_mA;
+    node->wanted_Wh = 6e5;
+    node->capacity_Wh = 100000.0;
+    node->conductors = node->claimed = node->config->phases;
+    node->voltage_mV = (uint32_t)node->config->voltage_mV;
+    node->plug_ms = world->now_ms + (int64_t)(FAIR_TICKS + FAIR_SETTLES) * world->config->tick_ms;
+    account_plugged(&world->account, i, node->session, node->claimed);
+}
+
+/** The minima of FAIR_PLACES fit. Everybody leaves first, so that nothing is held against anybody. */
 static void begin_fair(world_t *world) {
     const taper_connector_config_t *connector = &world->config->connectors[0];
     const int32_t least_W = connector->min_mA / 1000 * (connector->voltage_mV / 1000) * 3;
     gateway_hold(&world->gateway, least_W * FAIR_PLACES + 200);
     no_curve(world);
     for (unsigned i = 0; i < world->config->connector_count; i++) {
-        node_t *node = &world->node[i];
         unplug(world, i);
-        node_plug(node, LIE_NONE);
-        node->absurd = false;
-        node->pauses = false;
-        node->info_odd = false;
-        node->own_mA = node->config->max_mA;
-        node->min_mA = node->config->min_mA;
-        node->wanted_Wh = 6e5;
-        node->capacity_Wh = 100000.0;
-        node->conductors = node->claimed = node->config->phases;
-        node->voltage_mV = (uint32_t)node->config->voltage_mV;
-        node->plug_ms = world->now_ms + (int64_t)(FAIR_TICKS + FAIR_SETTLES) * world->config->tick_ms;
-        account_plugged(&world->account, i, node->session, node->claimed);
+        world->node[i].plug_ms = INT64_MAX;
     }
     world->policy = POLICY_EQUAL;
     world->fair_from = world->tick + FAIR_SETTLES;
     world->era_ends = world->fair_from + FAIR_TICKS;
+}
+
+static void be_fair(world_t *world) {
+    for (unsigned i = 0; i < world->config->connector_count && world->tick == world->fair_from - FAIR_PLUGGED;
+         i++) {
+        plug_hungry(world, i);
+    }
+    if (world->tick == world->fair_from) {
+        account_fair(&world->account, fair_bound_ms(world));
+    }
 }
 
 /** No more than one liar at a time: their over-draws would follow one another. */
@@ -218,12 +240,6 @@ static void begin_era(world_t *world) {
         begin_fair(world);
     }
     inject(world);
-}
-
-static int64_t fair_bound_ms(const world_t *world) {
-    const taper_station_config_t *config = world->config;
-    const int64_t turns = (config->connector_count + FAIR_PLACES - 1) / FAIR_PLACES;
-    return turns * ((int64_t)config->turn_ms + HAND_OVER_ms) + config->min_off_ms;
 }
 
 static void change_policy(world_t *world) {
@@ -267,7 +283,7 @@ void chaos_tick(world_t *world) {
         set_curve(world);
     }
     world->account.watches_physical = world->era == ERA_CALM;
-    if (world->era == ERA_FAIR && world->tick == world->fair_from) {
-        account_fair(&world->account, fair_bound_ms(world));
+    if (world->era == ERA_FAIR) {
+        be_fair(world);
     }
 }
