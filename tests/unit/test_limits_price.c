@@ -205,6 +205,9 @@ static void test_a_price_curve_that_is_not_sound_is_refused_and_the_old_one_stay
     price.point[3] = (taper_price_point_t){3 * HOUR_ms, TAPER_ABSENT};
     TEST_ASSERT_EQUAL(TAPER_ERR_ARGUMENT, taper_limits_set_price(&limits, &price));
     price.point[3].milli_per_kWh = 0;
+    price.point[0].milli_per_kWh = TAPER_ABSENT;
+    TEST_ASSERT_EQUAL(TAPER_ERR_ARGUMENT, taper_limits_set_price(&limits, &price));
+    price.point[0].milli_per_kWh = 0;
     price.point[5].time_ms = TAPER_CURVE_SPAN_ms + 1;
     TEST_ASSERT_EQUAL(TAPER_ERR_ARGUMENT, taper_limits_set_price(&limits, &price));
     price.count = TAPER_MAX_PRICE_POINTS + 1;

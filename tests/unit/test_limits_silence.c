@@ -111,12 +111,19 @@ static void test_the_meter_is_believed_for_three_seconds(void) {
     now_ms += TAPER_SITE_METER_TIMEOUT_ms;
     taper_limits_update(&limits, now_ms);
     TEST_ASSERT_EQUAL_INT32(1380, taper_limits_other_W(&limits, now_ms));
+    TEST_ASSERT_EQUAL_UINT(0, noted(TAPER_EVENT_METER_LOST));
     now_ms += 1;
     taper_limits_update(&limits, now_ms);
     TEST_ASSERT_EQUAL_INT32(6000, taper_limits_other_W(&limits, now_ms));
     TEST_ASSERT_EQUAL_UINT(1, noted(TAPER_EVENT_METER_LOST));
     meter(1000, 2000, 3000);
     TEST_ASSERT_EQUAL_UINT(1, noted(TAPER_EVENT_METER_BACK));
+    for (uint32_t k = 0; k < events.count; k++) {
+        TEST_ASSERT_EQUAL_UINT8(0, events.event[k].bus);
+        TEST_ASSERT_EQUAL_UINT8(TAPER_NODE_GATEWAY, events.event[k].node);
+        TEST_ASSERT_EQUAL_INT32(events.event[k].code == TAPER_EVENT_METER_LOST ? 6000 : 0,
+                                events.event[k].data);
+    }
     TEST_ASSERT_EQUAL_INT32(1380, taper_limits_other_W(&limits, now_ms));
 }
 

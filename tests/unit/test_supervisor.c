@@ -177,7 +177,7 @@ static void test_two_long_ticks_in_a_row_end_the_trust_for_good(void) {
     (void)taper_self_ticked(&self, UINT32_MAX, 1000);
     TEST_ASSERT_FALSE(taper_self_is_sound(&self));
     for (unsigned k = 0; k < 300; k++) {
-        TEST_ASSERT_EQUAL(k % 2 == 0, taper_self_ticked(&self, k % 2 == 0 ? 900 : 10, 1000));
+        TEST_ASSERT_EQUAL(k % 2 == 1, taper_self_ticked(&self, k % 2 == 1 ? 900 : 10, 1000));
         TEST_ASSERT_FALSE(taper_self_is_sound(&self));
     }
 }
@@ -192,6 +192,7 @@ static void test_two_flipped_setpoints_end_it_however_long_there_was_between_the
         taper_self_flipped(&self);
         TEST_ASSERT_FALSE(taper_self_is_sound(&self));
     }
+    TEST_ASSERT_EQUAL_UINT8(TAPER_RESET_FLIPS, self.flips);
 }
 
 int main(void) {

@@ -68,7 +68,7 @@ static void fill_gaps(taper_course_t *course, const bool *known, uint8_t steps) 
         sum += course->milli_per_kWh[t]; /* 0 where nothing is known */
         known_steps += known[t] ? 1 : 0;
     }
-    course->priced = known_steps > 0 && 2 * known_steps >= steps;
+    course->priced = 2 * known_steps >= steps;
     for (uint8_t t = 0; t < steps; t++) {
         if (!course->priced) {
             course->milli_per_kWh[t] = 0;

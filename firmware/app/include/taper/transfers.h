@@ -87,6 +87,7 @@ typedef enum {
     TAPER_RESULT_REFUSED,    /**< torn, corrupt or not valid; nothing changed */
 } taper_transfer_result_t;
 
+/** The thing itself: the member that the result names. */
 typedef union {
     taper_limit_curve_t curve;
     taper_price_curve_t price;

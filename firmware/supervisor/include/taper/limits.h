@@ -29,7 +29,7 @@
 #define TAPER_FLAP_ms UINT32_C(5000)
 /** It then counts as the least that it was within so long [ms of the world]. */
 #define TAPER_FLAP_HOLD_ms UINT32_C(30000)
-/** Lower limits of that time that are told apart. */
+/** Lower limits of that time that are told apart; where there are more, some count for longer. */
 #define TAPER_FLAP_LIMITS 8
 
 /** Who knows a course of the limit. The least of them counts. */
