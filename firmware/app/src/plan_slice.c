@@ -12,6 +12,7 @@ static bool plan_is_due(const taper_station_t *station, int32_t site_limit_W) {
     const uint32_t lasts_ms = station->plan_usable || step_ms < RETRY_ms ? step_ms : RETRY_ms;
     return station->planner.verdict == TAPER_VERDICT_NONE || station->planned_limit_W != site_limit_W ||
            station->planned_revision != station->sessions.revision ||
+           station->planned_curves != station->limits.revision ||
            taper_elapsed_ms(station->snapshot.now_ms, station->planner.started_ms) >= lasts_ms;
 }
 
@@ -21,6 +22,7 @@ static void start_plan(taper_station_t *station, int32_t site_limit_W) {
     taper_planner_start(&station->planner, &station->snapshot, &course);
     station->planned_limit_W = site_limit_W;
     station->planned_revision = station->sessions.revision;
+    station->planned_curves = station->limits.revision;
     station->solve_us = 0;
 }
 

@@ -24,6 +24,7 @@ taper_status_t taper_limits_set_curve(taper_limits_t *limits, taper_curve_owner_
         return TAPER_ERR_ARGUMENT;
     }
     limits->curve[owner] = *curve;
+    limits->revision++;
     return TAPER_OK;
 }
 

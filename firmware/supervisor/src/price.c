@@ -23,6 +23,7 @@ taper_status_t taper_limits_set_price(taper_limits_t *limits, const taper_price_
         return TAPER_ERR_ARGUMENT;
     }
     limits->price = *curve;
+    limits->revision++;
     return TAPER_OK;
 }
 

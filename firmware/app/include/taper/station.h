@@ -190,6 +190,7 @@ typedef struct {
     bool plan_usable;
     int32_t planned_limit_W; /**< site limit and table revision of the last problem */
     uint32_t planned_revision;
+    uint32_t planned_curves;     /**< and of the known courses */
     uint32_t solve_us;           /**< spent on the present problem */
     taper_limit_now_t limit_now; /**< of the last step */
     taper_snapshot_t snapshot;   /**< of the last step */

@@ -77,6 +77,7 @@ typedef struct {
     uint32_t negative;     /**< limits below zero, taken as zero; never falls */
     bool is_negative;      /**< the last one was */
     uint32_t flaps;        /**< times that the limit began to flap; never falls */
+    uint32_t revision;     /**< changes with every new curve: the planner is to think again */
 } taper_limits_t;
 
 typedef struct {
