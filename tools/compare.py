@@ -48,7 +48,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sessions", type=Path, required=True, help="sessions CSV")
     add_limit_arguments(parser)
-    parser.add_argument("--station", default="garage", help="hub, garage, depot or paper (default garage)")
+    parser.add_argument("--station", default="garage", help="hub, garage, depot, paper or caltech (default garage)")
     parser.add_argument("--tick-s", type=positive, default=60.0, help="control tick [s] (default 60)")
     parser.add_argument("--min-current-a", type=not_negative, help="least current of a connector that charges [A]")
     parser.add_argument("--policies", type=_policies, default=list(POLICIES),
