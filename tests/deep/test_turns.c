@@ -155,6 +155,34 @@ static void test_laxity_is_worked_out_to_the_second(void) {
     assert_on("1");
 }
 
+static void test_a_long_need_is_worked_out_to_the_second(void) {
+    start(2, 1);
+    tree.snapshot.demand[0].need_Wh = 7360;
+    tree.snapshot.demand[0].departs_in_s = 7200; /* 3600 s */
+    tree.snapshot.demand[1].need_Wh = 736000;    /* 100 hours */
+    tree.snapshot.demand[1].departs_in_s = 363601;
+    tree_allocate(&tree);
+    assert_on("0");
+    tree_init(&tree);
+    start(2, 1);
+    tree.snapshot.demand[0].need_Wh = 736000;
+    tree.snapshot.demand[0].departs_in_s = 363601;
+    tree.snapshot.demand[1].need_Wh = 7360;
+    tree.snapshot.demand[1].departs_in_s = 7200;
+    tree_allocate(&tree);
+    assert_on("1");
+}
+
+static void test_a_wish_of_just_the_minimum_comes_before_a_ceiling(void) {
+    start(2, 1);
+    tree_laxity(&tree, 0, 5000);
+    tree_wish(&tree, 0, 6000, 6000);
+    tree_wish(&tree, 1, 0, 32000);
+    tree_laxity(&tree, 1, 0);
+    tree_allocate(&tree);
+    assert_on("0");
+}
+
 static void test_a_turn_lasts_until_it_is_over_while_others_wait(void) {
     start(2, 1);
     tree_laxity(&tree, 1, 100);
@@ -606,6 +634,8 @@ int main(void) {
     RUN_TEST(test_laxity_counts_what_the_battery_still_takes);
     RUN_TEST(test_whose_battery_takes_nothing_comes_last);
     RUN_TEST(test_laxity_is_worked_out_to_the_second);
+    RUN_TEST(test_a_long_need_is_worked_out_to_the_second);
+    RUN_TEST(test_a_wish_of_just_the_minimum_comes_before_a_ceiling);
     RUN_TEST(test_a_turn_lasts_until_it_is_over_while_others_wait);
     RUN_TEST(test_nobody_leaves_when_the_turn_is_over_and_nobody_waits);
     RUN_TEST(test_who_waited_for_a_turn_is_before_who_is_more_urgent);
