@@ -54,15 +54,19 @@ class Result:
 class Build:
     """How a build folder compiles a file and links a test, by what ninja would run."""
 
-    def __init__(self, folder: Path, targets: set[str]) -> None:
+    def __init__(self, folder: Path, parts: list[Part]) -> None:
         self.folder = folder
+        targets = {test for part in parts for test in part.tests}
         subprocess.run(["cmake", "--build", folder, "-t", *sorted(targets)], check=True, stdout=subprocess.DEVNULL)
-        commands = subprocess.run(["ninja", "-C", folder, "-t", "commands", *sorted(targets)],
-                                  check=True, capture_output=True, text=True).stdout.splitlines()
-        self.commands = commands
+        self.commands = {part.name: self.commands_for(part) for part in parts}
 
-    def compile(self, source: Path, mutated: Path, output: Path) -> bool:
-        line = next(line for line in self.commands if line.endswith(f"-c {source}"))
+    def commands_for(self, part: Part) -> list[str]:
+        """For its tests alone: another part's may have the same source compiled for other sizes (tests/deep)."""
+        return subprocess.run(["ninja", "-C", self.folder, "-t", "commands", *part.tests],
+                              check=True, capture_output=True, text=True).stdout.splitlines()
+
+    def compile(self, part: Part, source: Path, mutated: Path, output: Path) -> bool:
+        line = next(line for line in self.commands[part.name] if line.endswith(f"-c {source}"))
         words = [word for word in shlex.split(line) if word != "-Werror"]
         for flag in ("-MF", "-MT", "-o"):
             at = words.index(flag)
@@ -71,9 +75,9 @@ class Build:
         words += [f"-I{source.parent}", "-w", "-c", str(mutated), "-o", str(output)]
         return subprocess.run(words, cwd=self.folder, capture_output=True).returncode == 0
 
-    def link(self, test: str, mutant: Path, output: Path) -> bool:
+    def link(self, part: Part, test: str, mutant: Path, output: Path) -> bool:
         """The mutant's object stands before the libraries, so that theirs is not taken."""
-        line = next(line for line in self.commands if f" -o tests/unit/{test} " in line)
+        line = next(line for line in self.commands[part.name] if f" -o tests/unit/{test} " in line)
         command = line.replace(f" -o tests/unit/{test} ", f" {mutant} -o {output} ")
         return subprocess.run(command, shell=True, cwd=self.folder, capture_output=True).returncode == 0
 
@@ -90,11 +94,11 @@ def judge(build: Build, part: Part, source: Path, text: str, mutant: Mutant, tim
         folder = Path(name)
         mutated, made = folder / source.name, folder / "mutant.o"
         mutated.write_text(mutant.apply(text))
-        if not build.compile(source, mutated, made):
+        if not build.compile(part, source, mutated, made):
             return "invalid"
         for test in part.tests:
             program = folder / test
-            if not build.link(test, made, program):
+            if not build.link(part, test, made, program):
                 return "invalid"
             if not passes(program, timeout_s):
                 return "killed"
@@ -130,7 +134,7 @@ def work_of(parts: list[Part], only: str | None, sample: int | None) -> list[tup
 
 
 def run(options: argparse.Namespace, parts: list[Part]) -> list[Result]:
-    build = Build(options.build.resolve(), {test for part in parts for test in part.tests})
+    build = Build(options.build.resolve(), parts)
     for test in sorted({test for part in parts for test in part.tests}):
         if not passes(options.build / "tests/unit" / test, options.timeout_s):
             raise SystemExit(f"tools/mutate.py: {test} fails without a mutant")

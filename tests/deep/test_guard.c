@@ -188,6 +188,9 @@ static void test_without_a_booking_three_phases_and_converters_count_on_all_line
         tree.connector[0].voltage_mV = 399001;
         tree.connector[0].efficiency_permille = 950;
         assert_just_enough(&tree.supply.phase_mA[line], 9792);
+        /* 380 V, 95 %: 400 W per A, 580 permille (579.7) */
+        tree.connector[0].voltage_mV = 380000;
+        assert_just_enough(&tree.supply.phase_mA[line], 9280);
     }
 }
 
@@ -225,6 +228,20 @@ static void test_currents_of_two_pairs_add_as_phasors(void) {
         give_pairs(line, 10000, 0, 20000);
         assert_just_enough(&tree.group[0].limit_mA, 26458);
     }
+}
+
+static void test_pairs_of_a_group_count_in_those_above_it(void) {
+    give_pairs(0, 20000, 0, 10000);
+    const uint8_t leaf = tree_add_group(&tree, 0);
+    for (uint8_t i = 0; i < 3; i++) {
+        tree.connector[i].group = leaf;
+    }
+    assert_just_enough(&tree.group[leaf].limit_mA, 26458);
+    tree_add_pair(&tree, 0, L1 | L2);
+    give(3, 10000);
+    assert_just_enough(&tree.group[0].limit_mA, 36056); /* 30 A and 10 A: sqrt(1300) = 36.0555 A */
+    give(3, 0);
+    assert_just_enough(&tree.group[0].limit_mA, 26458);
 }
 
 static void test_other_currents_on_a_line_add_to_the_pairs_in_full(void) {
@@ -365,6 +382,7 @@ int main(void) {
     RUN_TEST(test_without_a_booking_three_phases_and_converters_count_on_all_lines);
     RUN_TEST(test_a_booking_says_how_much_flows_for_an_ampere);
     RUN_TEST(test_currents_of_two_pairs_add_as_phasors);
+    RUN_TEST(test_pairs_of_a_group_count_in_those_above_it);
     RUN_TEST(test_other_currents_on_a_line_add_to_the_pairs_in_full);
     RUN_TEST(test_a_line_that_is_full_of_other_currents_has_no_room_for_a_pair);
     RUN_TEST(test_a_pair_on_lines_that_are_not_known_counts_on_all_in_full);

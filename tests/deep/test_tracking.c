@@ -99,6 +99,35 @@ static void test_a_vehicle_that_takes_no_more_than_its_ceiling_has_its_minimum_a
     TEST_ASSERT_EQUAL_INT32(6000, tree_allocate_after(&tree, 1));
 }
 
+static void test_what_completes_the_need_is_rounded_up_to_a_watt(void) {
+    tree.snapshot.demand[0].need_Wh = 1;
+    tree.config.tick_ms = 5000;                                      /* 720 W */
+    tree.proposal.wish_W[0] = tree.proposal.ceiling_W[0] = 720 - 23; /* a step less */
+    TEST_ASSERT_EQUAL_INT32(6000, tree_allocate(&tree));
+    start(1, 6000);
+    tree.snapshot.demand[0].need_Wh = 1;
+    tree.config.tick_ms = 4999;
+    tree.proposal.wish_W[0] = tree.proposal.ceiling_W[0] = 720 - 23;
+    TEST_ASSERT_EQUAL_INT32(0, tree_allocate(&tree));
+}
+
+static void test_what_is_owed_is_not_given_to_who_wants_nothing_now(void) {
+    start(1, 5000);
+    wish(3000);
+    tree_allocate(&tree);
+    wish(0);
+    tree.group[0].limit_mA = 6000;
+    TEST_ASSERT_EQUAL_INT32(0, tree_allocate_after(&tree, 300000));
+    tree.proposal.wish_W[0] = 1;
+    TEST_ASSERT_EQUAL_INT32(6000, tree_allocate_after(&tree, 1));
+}
+
+static void test_who_takes_nothing_and_wants_nothing_gets_nothing(void) {
+    tree.snapshot.demand[0].peak_W = 0;
+    wish(0);
+    TEST_ASSERT_EQUAL_INT32(0, tree_allocate(&tree));
+}
+
 /** One that draws less than it is told is not given more than it draws. */
 static void test_what_it_does_not_draw_is_not_booked_as_given(void) {
     wish(3000);
@@ -244,6 +273,9 @@ int main(void) {
     RUN_TEST(test_a_great_wish_is_on_for_as_long_as_it_is_owed);
     RUN_TEST(test_a_wish_of_the_minimum_needs_no_tracking);
     RUN_TEST(test_a_vehicle_that_takes_no_more_than_its_ceiling_has_its_minimum_all_the_time);
+    RUN_TEST(test_what_completes_the_need_is_rounded_up_to_a_watt);
+    RUN_TEST(test_what_is_owed_is_not_given_to_who_wants_nothing_now);
+    RUN_TEST(test_who_takes_nothing_and_wants_nothing_gets_nothing);
     RUN_TEST(test_what_it_does_not_draw_is_not_booked_as_given);
     RUN_TEST(test_what_is_left_over_counts_as_given_but_not_without_bound);
     RUN_TEST(test_what_waits_is_owed_but_not_without_bound);

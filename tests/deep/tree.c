@@ -111,3 +111,32 @@ uint32_t tree_random(uint32_t *state, uint32_t bound) {
     *state ^= *state << 5;
     return *state % bound;
 }
+
+void tree_start(tree_t *tree, unsigned vehicles, int32_t places) {
+    for (unsigned i = 0; i < vehicles; i++) {
+        tree_laxity(tree, tree_add(tree, 0, L1), (int32_t)i * 3600);
+    }
+    tree->group[0].limit_mA = places * 6000;
+}
+
+bool tree_is_on(const tree_t *tree, uint8_t i) {
+    return tree->setpoints.current_mA[i] > 0;
+}
+
+void tree_assert_on(const tree_t *tree, const char *expected) {
+    char on[TAPER_MAX_CONNECTORS + 1];
+    unsigned count = 0;
+    for (uint8_t i = 0; i < tree->config.connector_count; i++) {
+        if (tree_is_on(tree, i)) {
+            on[count++] = (char)('0' + i);
+        }
+    }
+    on[count] = '\0';
+    TEST_ASSERT_EQUAL_STRING(expected, on);
+}
+
+void tree_assert_waiting(const tree_t *tree, uint8_t i, uint8_t place, uint8_t of) {
+    const taper_waiting_t waiting = taper_allocator_waiting(&tree->allocator, i);
+    TEST_ASSERT_EQUAL_UINT8(place, waiting.place);
+    TEST_ASSERT_EQUAL_UINT8(of, waiting.of);
+}

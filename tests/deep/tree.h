@@ -52,4 +52,15 @@ bool tree_guard(const tree_t *tree);
 /** Next value of a small fixed pseudo-random generator (xorshift32), below `bound`. */
 uint32_t tree_random(uint32_t *state, uint32_t bound);
 
+/** `vehicles` on one phase, `places` for their minima. Laxity rises with the index, an hour each. */
+void tree_start(tree_t *tree, unsigned vehicles, int32_t places);
+
+bool tree_is_on(const tree_t *tree, uint8_t i);
+
+/** Those that are on are these, as a string of digits. */
+void tree_assert_on(const tree_t *tree, const char *expected);
+
+/** Connector `i` waits in this place; 0 of 0: it does not. */
+void tree_assert_waiting(const tree_t *tree, uint8_t i, uint8_t place, uint8_t of);
+
 #endif

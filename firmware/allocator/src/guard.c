@@ -1,14 +1,16 @@
 /* The last gate. It shares no code with the allocator on purpose: one mistake must not blind both. */
 #include "taper/allocator.h"
 
+#define LINES 3u
+
 /** 100 kA [0.1 mA]: beyond it squares do not fit 64 bits. No limit is taken to be as great. */
 #define MOST_uA100 INT64_C(1000000000)
 
 /** What flows into a group. */
 typedef struct {
     int64_t power_mW;
-    int64_t line_uA[3]; /* to neutral, or of three phases, or of a wiring that is not known: L1, L2, L3 */
-    int64_t pair_uA[3]; /* between two lines: L1-L2, L2-L3, L3-L1 */
+    int64_t line_uA[LINES]; /* to neutral, or of three phases, or of a wiring that is not known: L1, L2, L3 */
+    int64_t pair_uA[LINES]; /* between two lines: L1-L2, L2-L3, L3-L1 */
 } load_t;
 
 static bool connector_passes(const taper_connector_config_t *connector, const taper_demand_t *demand,
@@ -29,7 +31,8 @@ static int64_t quotient_up(int64_t dividend, int64_t divisor) {
 static uint8_t lines_of(const taper_connector_config_t *connector) {
     static const uint8_t first[] = {1, 1, 2, 4, 1, 2, 4};     /* by taper_rotation_t: line of conductor L1 */
     static const uint8_t first_two[] = {3, 3, 6, 5, 5, 3, 6}; /* of L1 and L2 */
-    const uint8_t rotation = connector->rotation < sizeof first ? connector->rotation : 0;
+    const uint8_t rotation =
+        connector->rotation < sizeof first ? connector->rotation : TAPER_ROTATION_UNKNOWN;
     if (connector->is_dc) {
         return 7;
     }
@@ -50,7 +53,7 @@ static taper_booking_t booking_of(const taper_station_config_t *config, const ta
         .W_per_A = taper_max_i32(demand->W_per_A, demand->booking.W_per_A),
         .permille = 1000,
         .phases = lines_of(connector),
-        .line_to_line = connector->line_to_line && !connector->is_dc,
+        .line_to_line = connector->line_to_line,
     };
     if (connector->is_dc) { /* all of its power, over three phases */
         const int64_t W_per_A =
@@ -64,21 +67,21 @@ static taper_booking_t booking_of(const taper_station_config_t *config, const ta
 static void add_current(load_t *load, const taper_booking_t *booking, int32_t current_mA) {
     const int64_t current_uA = (int64_t)current_mA * booking->permille;
     load->power_mW += (int64_t)current_mA * booking->W_per_A;
-    for (unsigned line = 0; line < 3; line++) {
-        const unsigned pair = 1u << line | 1u << (line + 1) % 3;
+    for (unsigned line = 0; line < LINES; line++) {
+        const unsigned pair = 1u << line | 1u << (line + 1) % LINES;
         if (booking->line_to_line && booking->phases == pair) {
             load->pair_uA[line] += current_uA;
             return;
         }
     }
-    for (unsigned line = 0; line < 3; line++) {
+    for (unsigned line = 0; line < LINES; line++) {
         load->line_uA[line] += (booking->phases >> line & 1u) != 0u ? current_uA : 0;
     }
 }
 
 static void add_load(load_t *sum, const load_t *load) {
     sum->power_mW += load->power_mW;
-    for (unsigned line = 0; line < 3; line++) {
+    for (unsigned line = 0; line < LINES; line++) {
         sum->line_uA[line] += load->line_uA[line];
         sum->pair_uA[line] += load->pair_uA[line];
     }
@@ -86,7 +89,7 @@ static void add_load(load_t *sum, const load_t *load) {
 
 /** A current of a pair, rounded up [0.1 mA]. */
 static int64_t pair_uA100(const load_t *load, unsigned pair) {
-    const int64_t current = quotient_up(load->pair_uA[pair % 3], 100);
+    const int64_t current = quotient_up(load->pair_uA[pair % LINES], 100);
     return current < MOST_uA100 ? current : MOST_uA100;
 }
 
@@ -113,17 +116,17 @@ static bool delta_passes(const load_t *load, unsigned line, int32_t limit_mA) {
     const int64_t bc = pair_uA100(load, line + 1);
     const int64_t ca = pair_uA100(load, line + 2);
     const int64_t square = ab * ab - ab * bc + bc * bc + 2 * ca * (ab + bc) + 4 * ca * ca;
-    return fits(square, load->line_uA[line] + load->line_uA[(line + 2) % 3], limit_mA);
+    return fits(square, load->line_uA[line] + load->line_uA[(line + 2) % LINES], limit_mA);
 }
 
 /** Current on a line as it counts for imbalance: pairs count on both of their lines. */
 static int64_t setpoints_uA(const load_t *load, unsigned line) {
-    return load->line_uA[line] + load->pair_uA[line] + load->pair_uA[(line + 2) % 3];
+    return load->line_uA[line] + load->pair_uA[line] + load->pair_uA[(line + 2) % LINES];
 }
 
 static bool balance_passes(const load_t *load, int32_t limit_mA) {
-    for (unsigned line = 0; line < 3; line++) {
-        const int64_t more_uA = setpoints_uA(load, line) - setpoints_uA(load, (line + 1) % 3);
+    for (unsigned line = 0; line < LINES; line++) {
+        const int64_t more_uA = setpoints_uA(load, line) - setpoints_uA(load, (line + 1) % LINES);
         const int64_t limit_uA = (int64_t)limit_mA * 1000;
         if (more_uA > limit_uA || more_uA < -limit_uA) {
             return false;
@@ -134,7 +137,7 @@ static bool balance_passes(const load_t *load, int32_t limit_mA) {
 
 /** Whether a group's load is within its own limits; `phase_mA`: of now, on each line. */
 static bool load_passes(const taper_group_config_t *group, const load_t *load, const int32_t *phase_mA) {
-    for (unsigned line = 0; line < 3; line++) {
+    for (unsigned line = 0; line < LINES; line++) {
         const int32_t limit_mA = taper_max_i32(taper_min_i32(group->limit_mA, phase_mA[line]), 0);
         if (group->limit_mA != 0 && !line_passes(load, line, limit_mA)) {
             return false;
@@ -149,7 +152,7 @@ static bool load_passes(const taper_group_config_t *group, const load_t *load, c
 
 bool taper_guard_passes(const taper_station_config_t *config, const taper_snapshot_t *snapshot,
                         const taper_supply_t *supply, const taper_setpoints_t *setpoints) {
-    static const int32_t as_described[3] = {INT32_MAX, INT32_MAX, INT32_MAX};
+    static const int32_t as_described[LINES] = {INT32_MAX, INT32_MAX, INT32_MAX};
     load_t load[TAPER_MAX_GROUPS] = {0};
     for (uint8_t i = 0; i < config->connector_count; i++) {
         const int32_t current_mA = setpoints->current_mA[i];
