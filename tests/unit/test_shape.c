@@ -238,7 +238,9 @@ static void test_each_connector_by_itself(void) {
     taper_shape_sent(&shape, 1, 10000, false, now_ms);
     taper_shape_sent(&shape, 3, 12000, false, now_ms - 60000);
     target.current_mA[1] = target.current_mA[2] = target.current_mA[3] = 30000;
+    shaped.current_mA[4] = 777; /* there is none */
     TEST_ASSERT_EQUAL_INT32(6000, shaped_mA(6000));
+    TEST_ASSERT_EQUAL_INT32(777, shaped.current_mA[4]);
     TEST_ASSERT_EQUAL_INT32(10000, shaped.current_mA[1]);
     TEST_ASSERT_EQUAL_INT32(6000, shaped.current_mA[2]);
     TEST_ASSERT_EQUAL_INT32(17000, shaped.current_mA[3]);

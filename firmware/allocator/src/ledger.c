@@ -107,19 +107,14 @@ static void follow_down(const taper_ledger_t *ledger, uint8_t connector, taper_l
 }
 
 static void drop_faded(taper_ledger_entry_t *entry, uint32_t time_ms) {
-    unsigned gone = 0;
-    const unsigned count = count_fades(entry);
-    while (gone < count && taper_time_reached(time_ms, entry->fade[gone].until_ms)) {
-        gone++;
-    }
-    memmove(entry->fade, entry->fade + gone, (count - gone) * sizeof entry->fade[0]);
-    for (unsigned k = count - gone; k < count; k++) {
-        entry->fade[k].mA = 0;
+    while (entry->fade[0].mA != 0 && taper_time_reached(time_ms, entry->fade[0].until_ms)) {
+        memmove(entry->fade, entry->fade + 1, (TAPER_LEDGER_FADES - 1u) * sizeof entry->fade[0]);
+        entry->fade[TAPER_LEDGER_FADES - 1u].mA = 0;
     }
 }
 
 static void drop_unknown(taper_ledger_entry_t *entry, uint32_t time_ms) {
-    if (entry->unknown_mA != 0 && taper_time_reached(time_ms, entry->unknown_until_ms)) {
+    if (taper_time_reached(time_ms, entry->unknown_until_ms)) {
         entry->unknown_mA = 0;
     }
 }
@@ -234,7 +229,7 @@ static void update_one(const taper_ledger_t *ledger, uint8_t connector, taper_le
         entry->first_echo = ECHO_IS_OURS;
     }
     drop_unknown(entry, now_ms);
-    if (entry->drawn_mA != 0 && taper_time_reached(now_ms, entry->drawn_until_ms)) {
+    if (taper_time_reached(now_ms, entry->drawn_until_ms)) {
         entry->drawn_mA = 0;
     }
 }

@@ -29,21 +29,23 @@ static bool waits(const taper_station_config_t *config, uint8_t i, int32_t sent_
                   uint32_t elapsed_ms) {
     const bool too_soon = !config->connectors[i].is_dc && elapsed_ms < config->change_ms;
     const bool too_small =
-        sent_mA > 0 && target_mA - sent_mA < config->deadband_mA && elapsed_ms < TAPER_SHAPE_SETTLE_ms;
+        sent_mA != 0 && target_mA - sent_mA < config->deadband_mA && elapsed_ms < TAPER_SHAPE_SETTLE_ms;
     return too_soon || too_small;
+}
+
+/** Whole ramp of `time_ms`. */
+static int32_t gained_mA(const taper_station_config_t *config, uint32_t time_ms) {
+    return taper_saturate_i32((int64_t)time_ms * config->ramp_mA_per_s / 1000);
 }
 
 /** What the ramp adds in `elapsed_ms`. Longer rests count no more, but always for one step of the wire. */
 static int32_t ramp_mA(const taper_station_config_t *config, uint32_t elapsed_ms) {
-    if (config->ramp_mA_per_s <= 0) {
+    if (config->ramp_mA_per_s == 0) {
         return TAPER_NO_LIMIT;
     }
-    const uint32_t ramp_mA_per_s = (uint32_t)config->ramp_mA_per_s;
-    const uint32_t step_ms = (TAPER_CURRENT_STEP_mA * 1000 + ramp_mA_per_s - 1) / ramp_mA_per_s;
-    uint32_t most_ms = config->change_ms > config->tick_ms ? config->change_ms : config->tick_ms;
-    most_ms = most_ms > step_ms ? most_ms : step_ms;
-    const uint32_t counted_ms = elapsed_ms < most_ms ? elapsed_ms : most_ms;
-    return taper_saturate_i32((int64_t)counted_ms * config->ramp_mA_per_s / 1000);
+    const int32_t most_mA =
+        taper_max_i32(gained_mA(config, config->change_ms), gained_mA(config, config->tick_ms));
+    return taper_min_i32(gained_mA(config, elapsed_ms), taper_max_i32(most_mA, TAPER_CURRENT_STEP_mA));
 }
 
 /** What may be sent now for a target above what was sent. */
