@@ -90,7 +90,7 @@ static void run_mutations(uint64_t frames, uint64_t seed) {
     }
 }
 
-static const char *const counter_name[TAPER_COUNTERS] = {
+static const char *const counter_name[] = {
     [TAPER_COUNTER_FRAMES_RECEIVED] = "station: frames received",
     [TAPER_COUNTER_FRAMES_SENT] = "station: frames sent",
     [TAPER_COUNTER_FRAMES_UNKNOWN] = "station: frames unknown",
@@ -112,7 +112,17 @@ static const char *const counter_name[TAPER_COUNTERS] = {
     [TAPER_COUNTER_PARAMETERS_REPAIRED] = "station: parameters repaired",
     [TAPER_COUNTER_TRANSFERS] = "station: transfers",
     [TAPER_COUNTER_TRANSFERS_REFUSED] = "station: transfers refused",
+    [TAPER_COUNTER_TICK_OVERRUNS] = "station: tick overruns",
+    [TAPER_COUNTER_SETPOINT_FLIPS] = "station: setpoint flips",
+    [TAPER_COUNTER_PLANNER_OFFS] = "station: planner offs",
+    [TAPER_COUNTER_OVER_DRAWS] = "station: over draws",
+    [TAPER_COUNTER_LOCKOUTS] = "station: lockouts",
+    [TAPER_COUNTER_LIMIT_FLAPS] = "station: limit flaps",
+    [TAPER_COUNTER_STRANGERS] = "station: strangers",
+    [TAPER_COUNTER_LIMITS_NEGATIVE] = "station: limits negative",
 };
+
+_Static_assert(sizeof counter_name / sizeof counter_name[0] == TAPER_COUNTERS, "each counter has a name");
 
 static void line(const char *what, uint64_t count) {
     printf("%-34s %12" PRIu64 "\n", what, count);
