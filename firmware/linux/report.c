@@ -97,6 +97,7 @@ void taper_report_summary(const taper_reported_t *about) {
         [TAPER_COUNTER_LOCKOUTS] = "lockouts",
         [TAPER_COUNTER_LIMIT_FLAPS] = "limit_flaps",
         [TAPER_COUNTER_STRANGERS] = "strangers",
+        [TAPER_COUNTER_LIMITS_NEGATIVE] = "limits_negative",
     };
     _Static_assert(sizeof names / sizeof names[0] == TAPER_COUNTERS, "each counter has a name");
     char counters[960] = "";

@@ -164,16 +164,49 @@ static void check_groups(const taper_station_t *station, const taper_setpoints_t
                sum_mW[0]);
 }
 
+/** What a connector draws without a controller: no more than with one. */
+static void check_fallback(const taper_connector_config_t *connector, int32_t fallback_mA,
+                           int32_t current_mA) {
+    check_that(fallback_mA >= 0 && fallback_mA <= current_mA, "fallback above the setpoint", fallback_mA);
+    check_that(fallback_mA <= connector->fallback_mA, "fallback above the described one", fallback_mA);
+    check_that(fallback_mA % TAPER_FALLBACK_STEP_mA == 0, "fallback between two steps", fallback_mA);
+    check_that(fallback_mA == 0 || fallback_mA >= connector->min_mA, "fallback below the minimum",
+               fallback_mA);
+}
+
+/** Setpoints and fallback currents are beside their inverses as they were decided. */
+static void check_seals(const taper_station_t *station) {
+    for (uint8_t i = 0; i < station->options.config->connector_count; i++) {
+        check_that(station->inverse.current_mA[i] == ~station->setpoints.current_mA[i], "seal of a setpoint",
+                   station->inverse.current_mA[i]);
+        check_that(station->fallback_inverse.current_mA[i] == ~station->fallback.current_mA[i],
+                   "seal of a fallback current", station->fallback_inverse.current_mA[i]);
+    }
+}
+
+/** The sum of fallback currents, by which connectors go on if this controller dies [mW]. */
+static int64_t fallback_mW(const taper_station_t *station) {
+    int64_t sum_mW = 0;
+    for (uint8_t i = 0; i < station->options.config->connector_count; i++) {
+        sum_mW += (int64_t)station->fallback.current_mA[i] * station->snapshot.demand[i].booking.W_per_A;
+    }
+    return sum_mW;
+}
+
 void check_currents(const taper_station_t *station) {
     const taper_station_config_t *config = station->options.config;
     for (uint8_t i = 0; i < config->connector_count; i++) {
         const taper_demand_t *demand = &station->snapshot.demand[i];
         const int32_t current_mA = station->setpoints.current_mA[i];
         check_current(&config->connectors[i], demand, current_mA);
-        check_that(current_mA <= station->target.current_mA[i], "current above the target", current_mA);
-        check_that(taper_ledger_may_mA(&station->ledger, i) <= config->connectors[i].max_mA,
-                   "what a connector may draw", taper_ledger_may_mA(&station->ledger, i));
+        check_that(current_mA <= station->shaped.current_mA[i], "current above what may be told", current_mA);
+        check_that(station->shaped.current_mA[i] <= station->target.current_mA[i], "current above the target",
+                   station->shaped.current_mA[i]);
+        check_fallback(&config->connectors[i], station->fallback.current_mA[i], current_mA);
+        check_that(taper_ledger_told_mA(&station->ledger, i) <= config->connectors[i].max_mA,
+                   "what a connector was told", taper_ledger_told_mA(&station->ledger, i));
     }
+    check_seals(station);
     check_groups(station, &station->target);
     check_groups(station, &station->setpoints);
     check_that(taper_station_counter(station, TAPER_COUNTER_GUARD_VIOLATIONS) == 0, "guard violations",
@@ -203,18 +236,24 @@ void check_station(const taper_station_t *station) {
             check_no_demand(demand);
         }
     }
+    check_that(fallback_mW(station) <= (int64_t)station->limits.failsafe_W * 1000,
+               "power without a controller [mW]", fallback_mW(station));
     check_currents(station);
 }
 
 void check_setpoint(const taper_station_config_t *config, const taper_message_t *message) {
     const int connector = taper_session_connector(config, message->bus, message->node);
-    check_that(connector >= 0, "setpoint for nobody", message->node);
-    const taper_connector_config_t *of = &config->connectors[connector];
     const taper_setpoint_t *setpoint = &message->as.setpoint;
+    if (connector < 0) { /* one that there is no place for (fault 31) */
+        check_that(setpoint->command == TAPER_COMMAND_PAUSE && setpoint->current_mA == 0 &&
+                       setpoint->fallback_mA == 0,
+                   "current for a stranger", message->node);
+        return;
+    }
+    const taper_connector_config_t *of = &config->connectors[connector];
     check_that(setpoint->current_mA <= of->max_mA, "setpoint above the connector's maximum",
                setpoint->current_mA);
-    check_that(setpoint->fallback_mA <= of->max_mA, "fallback above the connector's maximum",
-               setpoint->fallback_mA);
+    check_fallback(of, setpoint->fallback_mA, setpoint->current_mA);
     check_that(setpoint->command == TAPER_COMMAND_CHARGE || setpoint->current_mA == 0,
                "current without the command to charge", setpoint->current_mA);
 }

@@ -115,11 +115,13 @@ static const char *const counter_name[] = {
     [TAPER_COUNTER_TICK_OVERRUNS] = "station: tick overruns",
     [TAPER_COUNTER_SETPOINT_FLIPS] = "station: setpoint flips",
     [TAPER_COUNTER_PLANNER_OFFS] = "station: planner offs",
-    [TAPER_COUNTER_OVER_DRAWS] = "station: over-draws",
+    [TAPER_COUNTER_OVER_DRAWS] = "station: over draws",
     [TAPER_COUNTER_LOCKOUTS] = "station: lockouts",
     [TAPER_COUNTER_LIMIT_FLAPS] = "station: limit flaps",
     [TAPER_COUNTER_STRANGERS] = "station: strangers",
+    [TAPER_COUNTER_LIMITS_NEGATIVE] = "station: limits negative",
 };
+
 _Static_assert(sizeof counter_name / sizeof counter_name[0] == TAPER_COUNTERS, "each counter has a name");
 
 static void line(const char *what, uint64_t count) {

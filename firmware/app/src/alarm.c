@@ -34,7 +34,8 @@ void taper_alarm_raise(taper_station_t *station, taper_event_code_t code, uint8_
 static uint8_t reaction_to(taper_event_code_t code) {
     switch (code) {
     case TAPER_EVENT_BAD_FRAMES: return 1;
-    case TAPER_EVENT_BABBLING: return 2;
+    case TAPER_EVENT_BABBLING:
+    case TAPER_EVENT_OVER_DRAW: return 2;
     case TAPER_EVENT_TWO_CONTROLLERS: return 3;
     default: return 0;
     }

@@ -89,6 +89,7 @@ static void copy_counters(taper_station_t *station) {
     count[TAPER_COUNTER_SOC_JUMPS] = station->sessions.soc_jumps;
     count[TAPER_COUNTER_PARAMETERS_REPAIRED] = station->sessions.repaired;
     count[TAPER_COUNTER_LIMIT_FLAPS] = station->limits.flaps;
+    count[TAPER_COUNTER_LIMITS_NEGATIVE] = station->limits.negative;
 }
 
 /** A step that comes late tells that the one before, or what ran beside it, took too long. */

@@ -32,14 +32,19 @@ static void forget_silent(taper_station_t *station, uint32_t now_ms) {
     }
 }
 
-/** The place of the frame's sender; a new one if it can be had, else NULL: as many are noted already. */
-static taper_stranger_t *place_of(taper_station_t *station, const taper_frame_t *frame) {
-    const unsigned count = count_strangers(station);
-    for (unsigned k = 0; k < count; k++) {
-        if (is_one(&station->stranger[k], frame)) {
+/** The frame's sender, or NULL: it is not noted. */
+static taper_stranger_t *find(taper_station_t *station, const taper_frame_t *frame) {
+    for (unsigned k = 0; k < TAPER_STRANGERS; k++) {
+        if (station->stranger[k].node != 0 && is_one(&station->stranger[k], frame)) {
             return &station->stranger[k];
         }
     }
+    return NULL;
+}
+
+/** A new place for the frame's sender, or NULL: as many are noted already. */
+static taper_stranger_t *add(taper_station_t *station, const taper_frame_t *frame) {
+    const unsigned count = count_strangers(station);
     if (count == TAPER_STRANGERS) {
         return NULL;
     }
@@ -50,26 +55,42 @@ static taper_stranger_t *place_of(taper_station_t *station, const taper_frame_t 
     return &station->stranger[count];
 }
 
-/** A sound EVSE_STATUS with a vehicle; anybody's by itself, since nothing is remembered of a sender without a place. */
-static bool has_vehicle(const taper_frame_t *frame) {
+/** Any sound frame by itself: nothing is remembered of a sender without a place. */
+static bool read_alone(const taper_frame_t *frame, taper_message_t *message) {
     taper_e2e_receiver_t fresh = {0};
-    taper_message_t message;
     bool bad_field = false;
-    return taper_e2e_check(&fresh, frame) == TAPER_E2E_OK && taper_decode(frame, &message, &bad_field) &&
-           message.as.evse_status.ev_present;
+    return taper_e2e_check(&fresh, frame) == TAPER_E2E_OK && taper_decode(frame, message, &bad_field);
+}
+
+static void hear_status(taper_station_t *station, const taper_frame_t *frame) {
+    taper_stranger_t *stranger = find(station, frame);
+    stranger = stranger != NULL ? stranger : add(station, frame);
+    if (stranger != NULL) {
+        stranger->heard_ms = frame->time_ms;
+    }
+}
+
+/** It obeys setpoints for its own session only. */
+static void hear_session(taper_station_t *station, const taper_frame_t *frame, uint8_t session) {
+    taper_stranger_t *stranger = find(station, frame);
+    if (stranger != NULL) {
+        stranger->session = session;
+    }
 }
 
 void taper_strangers_hear(taper_station_t *station, const taper_frame_t *frame) {
     const unsigned node = frame->id & 0x3Fu;
-    const bool is_status = frame->id >> 6 == TAPER_MESSAGE_EVSE_STATUS && node >= 1 &&
-                           node <= TAPER_NODES_PER_BUS &&
-                           frame->bus < taper_station_buses(station->options.config);
-    if (!is_status || !has_vehicle(frame)) {
+    const unsigned function = (unsigned)frame->id >> 6;
+    const bool tells = function == TAPER_MESSAGE_EVSE_STATUS || function == TAPER_MESSAGE_EV_PARAM_A;
+    taper_message_t message;
+    if (!tells || node < 1 || node > TAPER_NODES_PER_BUS ||
+        frame->bus >= taper_station_buses(station->options.config) || !read_alone(frame, &message)) {
         return;
     }
-    taper_stranger_t *stranger = place_of(station, frame);
-    if (stranger != NULL) {
-        stranger->heard_ms = frame->time_ms;
+    if (function == TAPER_MESSAGE_EV_PARAM_A) {
+        hear_session(station, frame, message.as.ev_param_a.session);
+    } else if (message.as.evse_status.ev_present) {
+        hear_status(station, frame);
     }
 }
 
@@ -78,7 +99,8 @@ static void send_to(taper_station_t *station, unsigned place, unsigned count, ui
     taper_message_t pause = {.kind = TAPER_MESSAGE_SETPOINT, .bus = stranger->bus, .node = stranger->node};
     taper_message_t outlook = {.kind = TAPER_MESSAGE_OUTLOOK, .bus = stranger->bus, .node = stranger->node};
     pause.as.setpoint = (taper_setpoint_t){.command = TAPER_COMMAND_PAUSE,
-                                           .validity_ms = (int32_t)station->ledger.validity_ms};
+                                           .validity_ms = (int32_t)station->ledger.validity_ms,
+                                           .session = stranger->session};
     outlook.as.outlook = (taper_outlook_t){.reason = TAPER_REASON_QUEUED,
                                            .waiting_place = (uint8_t)(place + 1u),
                                            .waiting_of = (uint8_t)count,

@@ -36,8 +36,27 @@ static bool listen(void *context, taper_frame_t *frame) {
 }
 
 static bool speak(void *context, const taper_frame_t *frame) {
-    note(fault.said, frame);
-    return fault.send(context, frame);
+    taper_frame_t altered = *frame;
+    if (fault.alter != NULL) {
+        fault.alter(&altered);
+    }
+    note(fault.said, &altered);
+    return fault.send(context, &altered);
+}
+
+void fault_open(const live_options_t *options, const sim_session_t *sessions, unsigned count) {
+    live_bench_start(options, sessions, count);
+    memset(&fault, 0, sizeof fault);
+    fault.send = live.world_port.send;
+    fault.receive = live.world_port.receive;
+    live.world_port.send = speak;
+    live.world_port.receive = listen;
+    fault_begins();
+}
+
+void fault_switch_soon(void) {
+    live.config.min_on_ms = FAULT_SWITCH_ms;
+    live.config.min_off_ms = FAULT_SWITCH_ms;
 }
 
 void fault_start(unsigned vehicles, double limit_kw) {
@@ -46,16 +65,25 @@ void fault_start(unsigned vehicles, double limit_kw) {
     for (unsigned i = 0; i < vehicles; i++) {
         sessions[i] = live_vehicle(0.0);
     }
-    live_bench_start(&options, sessions, vehicles);
-    live.config.min_on_ms = FAULT_SWITCH_ms;
-    live.config.min_off_ms = FAULT_SWITCH_ms;
-    memset(&fault, 0, sizeof fault);
-    fault.send = live.world_port.send;
-    fault.receive = live.world_port.receive;
-    live.world_port.send = speak;
-    live.world_port.receive = listen;
+    fault_open(&options, sessions, vehicles);
+    fault_switch_soon();
     live_bench_run_ms(20000);
     fault_begins();
+}
+
+bool fault_read(const taper_frame_t *frame, taper_message_t *message) {
+    bool bad_field = false;
+    return taper_decode(frame, message, &bad_field);
+}
+
+void fault_protect(taper_frame_t *frame) {
+    taper_e2e_protect(frame, frame->data[1] & 0x0Fu);
+}
+
+void fault_rewrite(taper_frame_t *frame, const taper_message_t *message) {
+    const uint8_t counter = frame->data[1] & 0x0Fu;
+    TEST_ASSERT_TRUE(taper_encode(message, frame));
+    taper_e2e_protect(frame, counter);
 }
 
 void fault_begins(void) {
@@ -140,8 +168,12 @@ taper_setpoint_t fault_setpoint(uint8_t node) {
     return told(TAPER_MESSAGE_SETPOINT, node).as.setpoint;
 }
 
+taper_outlook_t fault_outlook(uint8_t node) {
+    return told(TAPER_MESSAGE_OUTLOOK, node).as.outlook;
+}
+
 taper_reason_t fault_reason(uint8_t node) {
-    return (taper_reason_t)told(TAPER_MESSAGE_OUTLOOK, node).as.outlook.reason;
+    return (taper_reason_t)fault_outlook(node).reason;
 }
 
 taper_ctrl_status_t fault_status(void) {

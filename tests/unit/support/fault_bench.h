@@ -29,8 +29,9 @@ typedef struct {
     uint32_t emcy_ms[FAULT_EMCYS];
     unsigned emcys;
     taper_membus_injector_t injector;
-    uint8_t counter[2048];                                   /**< of the frames that the test speaks */
-    uint32_t began_ms;                                       /**< of the fault: set by fault_begins() */
+    uint8_t counter[2048];               /**< of the frames that the test speaks */
+    uint32_t began_ms;                   /**< of the fault: set by fault_begins() */
+    void (*alter)(taper_frame_t *frame); /**< what the field says is said like this; NULL: as it is */
     bool (*send)(void *context, const taper_frame_t *frame); /**< of the bus */
     bool (*receive)(void *context, taper_frame_t *frame);
 } fault_bench_t;
@@ -39,6 +40,16 @@ extern fault_bench_t fault;
 
 /** `vehicles` are there from the start, under `limit_kw`; charging has settled after 20 s. */
 void fault_start(unsigned vehicles, double limit_kw);
+
+/** The same with options and vehicles of the test's own: no time has passed yet. */
+void fault_open(const live_options_t *options, const sim_session_t *sessions, unsigned count);
+/** Connectors may be switched after FAULT_SWITCH_ms. */
+void fault_switch_soon(void);
+
+/** For `fault.alter`: what a frame says, if it is no ISO-TP; have it say something else; make changed bytes sound. */
+bool fault_read(const taper_frame_t *frame, taper_message_t *message);
+void fault_rewrite(taper_frame_t *frame, const taper_message_t *message);
+void fault_protect(taper_frame_t *frame);
 
 /** The fault begins now: what is measured counts from here, and the EMCY log is empty. */
 void fault_begins(void);
@@ -68,6 +79,7 @@ uint32_t fault_count(taper_counter_t counter);
 
 /** What the station last told on the bus. */
 taper_setpoint_t fault_setpoint(uint8_t node);
+taper_outlook_t fault_outlook(uint8_t node);
 taper_reason_t fault_reason(uint8_t node);
 taper_ctrl_status_t fault_status(void);
 

@@ -121,6 +121,7 @@ typedef struct {
 typedef struct {
     uint8_t bus, node;
     uint8_t setpoint_counter, outlook_counter;
+    uint8_t session; /**< that it told; 0: none yet */
     uint32_t heard_ms;
 } taper_stranger_t;
 
