@@ -17,7 +17,8 @@ def reason_against(station: Station, connector: Connector) -> tuple[str, str] | 
             return "min_A", f'{connector.min_mA / 1000:g} A {reason} of "{station.groups[k].name}"'
     fallback_W = _power_W(connector, connector.fallback_mA)
     if fallback_W > station.failsafe_W:
-        return "fallback_A", f"{fallback_W / 1000:.10g} kW, above the site's failsafe_kW of {station.failsafe_W / 1000:.10g}"
+        failsafe_kW = f"{station.failsafe_W / 1000:.10g}"
+        return "fallback_A", f"{fallback_W / 1000:.10g} kW, above the site's failsafe_kW of {failsafe_kW}"
     return None
 
 

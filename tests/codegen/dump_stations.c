@@ -1,6 +1,8 @@
-/* Prints the generated tables, one line for each station, group and connector, for test_generated_tables.py. */
+/* Prints the generated tables, one line for each station, group and connector, for test_generated_tables.py.
+   Fails if the firmware would refuse one of them at boot. */
 #include <stdio.h>
 
+#include "taper/config_check.h"
 #include "taper/stations.h"
 
 static void print_connector(const taper_connector_config_t *c) {
@@ -31,8 +33,10 @@ static void print_station(const taper_station_config_t *s) {
 }
 
 int main(void) {
+    bool sound = true;
     for (unsigned k = 0; k < taper_station_count; k++) {
         print_station(taper_stations[k]);
+        sound = sound && taper_config_check(taper_stations[k]) == TAPER_OK;
     }
-    return 0;
+    return sound ? 0 : 1;
 }

@@ -4,13 +4,15 @@ import subprocess
 import tomllib
 from pathlib import Path
 
+import pytest
 from conftest import CODEGEN, ROOT, STATIONS, Run, compile_c
+from station_texts import EDGES, WIRED, twelve_groups
 from test_station_files import GOOD
-from test_station_wiring import WIRED
 
 DUMP = Path(__file__).with_name("dump_stations.c")
 STRICT = ("-Wpedantic", "-Wconversion", "-Wshadow")
-TYPES = ROOT / "firmware/types/include"
+INCLUDES = [ROOT / f"firmware/{layer}/include" for layer in ("types", "app")]
+CHECK = [ROOT / f"firmware/{source}" for source in ("app/src/config_check.c", "types/src/rows.c")]
 
 # taper_rotation_t: of three phases, and of the first conductors of one phase or of a pair of lines.
 ROTATIONS = {"L1-L2-L3": 1, "L2-L3-L1": 2, "L3-L1-L2": 3, "L1-L3-L2": 4, "L2-L1-L3": 5, "L3-L2-L1": 6}
@@ -18,8 +20,8 @@ FIRST = {"L1": 1, "L2": 2, "L3": 3, "L1-L2": 1, "L2-L3": 2, "L3-L1": 3}
 
 
 def dumped(tree: Path, folder: Path) -> list[str]:
-    """What a C program reads out of the tables."""
-    compile_c([DUMP, tree / "stations.c"], [tree / "include", TYPES], folder / "dump", *STRICT)
+    """What a C program reads out of the tables; it fails if the boot-time check refuses them."""
+    compile_c([DUMP, tree / "stations.c", *CHECK], [tree / "include", *INCLUDES], folder / "dump", *STRICT)
     return subprocess.run([folder / "dump"], capture_output=True, text=True, check=True).stdout.splitlines()
 
 
@@ -111,6 +113,13 @@ def test_every_quantity_of_a_file_reaches_its_place(generate: Run, tmp_path: Pat
         "connector 6000 32000 0 208000 5000 1000 1 3 1 1 0 3 0",
         "connector 1000 60000 1000 400000 500 925 1 1 0 1 0 4 1",
     ]
+
+
+@pytest.mark.parametrize("text", [twelve_groups(), EDGES], ids=["twelve groups", "edges"])
+def test_what_a_file_may_say_passes_the_check_at_boot(text: str, generate: Run, tmp_path: Path) -> None:
+    lines, said = tables_of(generate, text, tmp_path), expected(tomllib.loads(text))
+    assert lines[0] == said[0]
+    assert len(lines) == len(said)
 
 
 def test_sizes_are_the_greatest_of_the_stations(tree: Path, real: str) -> None:

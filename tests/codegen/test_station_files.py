@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from conftest import STATIONS, Run, content
+from conftest import CODEGEN, STATIONS, Run, content
 from station import Station, read_station
 from toml_table import TomlError
 
@@ -272,5 +272,35 @@ def test_every_sixty_connectors_share_a_bus(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("name", "count"), list(zip(STATIONS, (8, 54, 130, 60, 54), strict=True)))
 def test_the_stations_of_the_repository_are_good(name: str, count: int) -> None:
-    path = Path(__file__).parents[2] / "codegen" / "stations" / f"{name}.toml"
-    assert len(read_station(path).connectors) == count
+    assert len(read_station(CODEGEN / f"stations/{name}.toml").connectors) == count
+
+
+def test_caltech_is_wired_as_the_literature_says() -> None:
+    """54 sockets of 32 A at 208 V: 26 + 14 + 14 on the pairs of lines, two pods of eight behind 80 A, 150 kVA."""
+    station = read_station(CODEGEN / "stations/caltech.toml")
+    assert all(c.line_to_line and c.phases == 1 for c in station.connectors)
+    assert {(c.voltage_mV, c.max_mA) for c in station.connectors} == {(208_000, 32_000)}
+    pairs = [c.rotation for c in station.connectors]
+    assert [pairs.count(pair) for pair in ("123", "231", "312")] == [26, 14, 14]
+    site, *pods = station.groups
+    assert station.site_voltage_mV == 120_000
+    assert site.limit_W == 150_000
+    assert site.limit_mA == pytest.approx(150_000_000 / 3 / 120, abs=100)
+    assert site.delta_mA == pytest.approx(150_000_000 / 3 / 277 * 4, abs=100)  # 480 V to 120 V
+    assert [(pod.limit_mA, pod.limit_W, pod.parent) for pod in pods] == [(80_000, 0, 0)] * 2
+    below = [[station.connectors[i].rotation for i in station.connectors_below(k)] for k in (1, 2)]
+    assert below == [["123"] * 8] * 2
+
+
+@pytest.mark.parametrize("name", ["hub", "garage", "depot", "caltech"])
+def test_every_station_but_the_papers_falls_back_to_the_least_current(name: str) -> None:
+    station = read_station(CODEGEN / f"stations/{name}.toml")
+    assert {c.fallback_mA for c in station.connectors} == {6_000}
+    assert (station.ramp_mA_per_s, station.deadband_mA) == (2_000, 500)
+
+
+def test_the_garage_is_spread_over_the_phases_and_limited_in_power_alone() -> None:
+    station = read_station(CODEGEN / "stations/garage.toml")
+    rotations = [c.rotation for c in station.connectors]
+    assert [rotations.count(rotation) for rotation in ("123", "231", "312")] == [18, 18, 18]
+    assert not any(group.limits_phases for group in station.groups)

@@ -95,8 +95,10 @@ static void test_a_poisoned_solver_means_fallback_in_the_same_tick_and_a_new_try
     bench_step(); /* nothing has changed: no new try yet */
     TEST_ASSERT_EQUAL(TAPER_MODE_FALLBACK, taper_station_mode(&bench.station));
     bench.now_ms += 60000;
-    bench_send_all(8, 9000);
-    bench_step();
+    for (int tick = 0; tick < 2; tick++) { /* the first comes late, and is left to EDF */
+        bench_send_all(8, 9000);
+        bench_step();
+    }
     TEST_ASSERT_EQUAL(TAPER_MODE_PLAN, taper_station_mode(&bench.station));
     TEST_ASSERT_EQUAL_UINT32(1, taper_station_counter(&bench.station, TAPER_COUNTER_PLANS_REJECTED));
     TEST_ASSERT_EQUAL_UINT32(0, taper_station_counter(&bench.station, TAPER_COUNTER_GUARD_VIOLATIONS));

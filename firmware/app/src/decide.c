@@ -196,7 +196,7 @@ static void grant_fallback(taper_station_t *station) {
 /** What of the target may be told and is paid for by now. */
 static void grant(taper_station_t *station, uint32_t now_ms) {
     const taper_station_config_t *config = station->options.config;
-    taper_setpoints_t granted;
+    taper_setpoints_t granted = {{0}}; /* all of it: it is compared whole */
     taper_shape_bound(&station->shape, config, &station->snapshot, &station->target,
                       world_ms(station, now_ms), &station->shaped);
     taper_ledger_grant(&station->ledger, config, &station->snapshot, station->proposal.rank,

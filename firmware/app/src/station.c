@@ -44,6 +44,7 @@ taper_status_t taper_station_init(taper_station_t *station, const taper_station_
     station->options.time_scale = options->time_scale == 0 ? 1 : options->time_scale;
     init_layers(station);
     taper_station_forget_sent(station);
+    taper_station_seal(station);
     taper_record_load(station);
     if (options->solver != NULL) {
         return taper_planner_init(&station->planner, options->solver, options->config);
@@ -79,6 +80,7 @@ static void begin(taper_station_t *station, uint32_t now_ms) {
     taper_ledger_update(&station->ledger, now_ms);
     taper_bus_guard_update(station, now_ms);
     watch_rival(station, now_ms);
+    taper_station_check_seal(station, now_ms); /* before they are worked out anew, and again before they are sent */
 }
 
 static void copy_counters(taper_station_t *station) {
