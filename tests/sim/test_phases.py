@@ -1,4 +1,4 @@
-"""Limits per phase, with vehicles that use one phase or three; loads.c and its own tests say how they are held against them."""
+"""Limits per phase, with vehicles that use one phase or three. test_loads.c proves the measure that finds violations."""
 
 import pytest
 from conftest import csv_text, session
