@@ -13,19 +13,20 @@ import pytest
 REQUIRED = ("session_id", "connector", "arrival_s", "departure_s", "battery_kwh", "soc_arrival", "soc_target",
             "max_kw", "taper_kw")
 TOLD = "expected_departure_s"
+OPTIONAL = (TOLD, "phases")
 
 
 def session(session_id, **changed):
     """A session as a row: a car of 40 kWh that comes at 0 s, stays 4 h, and wants 8 kWh at up to 7 kW."""
     row = dict(session_id=session_id, connector="", arrival_s=0, departure_s=4 * 3600, battery_kwh=40,
                soc_arrival=0.5, soc_target=0.7, max_kw=7, taper_kw=4)
-    assert set(changed) <= set(row) | {TOLD}
+    assert set(changed) <= {*row, *OPTIONAL}
     return row | changed
 
 
 def csv_text(rows, columns=None):
     if columns is None:
-        columns = REQUIRED + ((TOLD,) if any(TOLD in row for row in rows) else ())
+        columns = REQUIRED + tuple(name for name in OPTIONAL if any(name in row for row in rows))
     stream = io.StringIO()
     writer = csv.DictWriter(stream, columns, restval="", lineterminator="\n")
     writer.writeheader()

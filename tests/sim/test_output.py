@@ -10,10 +10,13 @@ from conftest import session
 SUMMARY = ["policy", "station", "sessions", "requested_kwh", "delivered_kwh", "satisfied", "limit_violations",
            "fallback_ticks", "solves", "iterations", "solve_ms", "peak_kw"]
 HEADERS = {
-    "sessions.csv": "session_id,connector,energy_kwh,soc_departure,satisfied,short_kwh,queued_s",
+    "sessions.csv": "session_id,connector,energy_kwh,soc_departure,satisfied,short_kwh,queued_s,reason,because",
     "steps.csv": "time_s,limit_kw,power_kw,active,mode",
-    "connectors.csv": "time_s,connector,session_id,setpoint_a,current_a,soc",
+    "connectors.csv": "time_s,connector,session_id,setpoint_a,current_a,soc,reason,waiting_place,waiting_of,"
+                      "soc_estimated,expected_soc,short_kwh,because",
 }
+WORDS = {"session_id", "mode", "reason", "because"}
+MAY_BE_EMPTY = {"expected_soc", "short_kwh"}  # in connectors.csv, where the station expects nothing
 FILES = ["connectors.csv", "sessions.csv", "steps.csv", "summary.json"]
 ROWS = [session(f"car-{number}", arrival_s=300 * number, departure_s=7200 + 1080 * number, max_kw=11 + number,
                 soc_arrival=0.05 * number, battery_kwh=50 + number) for number in range(10)]
@@ -43,7 +46,7 @@ def test_the_files_agree_with_one_another(sim):
     delivered = sum(float(row["energy_kwh"]) for row in run.sessions.values())
     assert run.summary["delivered_kwh"] == pytest.approx(delivered, abs=1e-3)
     assert run.summary["satisfied"] == sum(row["satisfied"] == "1" for row in run.sessions.values())
-    assert run.summary["peak_kw"] == max(float(row["power_kw"]) for row in run.steps)
+    assert max(float(row["power_kw"]) for row in run.steps) <= run.summary["peak_kw"] <= 40
     by_time = {}
     for row in run.connectors:
         by_time[row["time_s"]] = by_time.get(row["time_s"], 0) + float(row["current_a"]) * 0.69
@@ -174,5 +177,6 @@ def test_all_numbers_are_plain_decimals(sim):
         with (run.out / name).open(newline="") as file:
             for row in csv.DictReader(file):
                 for column, value in row.items():
-                    if column not in ("session_id", "mode"):
+                    empty = value == "" and name == "connectors.csv" and column in MAY_BE_EMPTY
+                    if column not in WORDS and not empty:
                         assert number.fullmatch(value), (name, column, value)

@@ -227,10 +227,12 @@ static void test_a_course_too_long_for_one_transfer_comes_in_parts(void) {
     start_under_limits(60);
     live_bench_run_ms(12000);
     TEST_ASSERT_EQUAL_UINT32(1, curves_noted());
-    TEST_ASSERT_GREATER_THAN_UINT16(TAPER_MAX_LIMIT_POINTS - 10, live.station.limits.curve[TAPER_CURVE_OF_GATEWAY].count);
+    TEST_ASSERT_GREATER_THAN_UINT16(TAPER_MAX_LIMIT_POINTS - 10,
+                                    live.station.limits.curve[TAPER_CURVE_OF_GATEWAY].count);
     live_bench_run_ms(120000);
     TEST_ASSERT_GREATER_THAN_UINT32(4, curves_noted());
-    TEST_ASSERT_GREATER_THAN_UINT16(TAPER_MAX_LIMIT_POINTS - 20, live.station.limits.curve[TAPER_CURVE_OF_GATEWAY].count);
+    TEST_ASSERT_GREATER_THAN_UINT16(TAPER_MAX_LIMIT_POINTS - 20,
+                                    live.station.limits.curve[TAPER_CURVE_OF_GATEWAY].count);
 }
 
 /** Begin to send to nobody, so that the message can be looked at. */
@@ -290,6 +292,62 @@ static void test_what_is_past_or_far_ahead_stays_out(void) {
     assert_point(message, 1, 100.0, 300);
 }
 
+/** The same for prices alone. */
+static const uint8_t *price_message_at(sim_curve_t *curve, double after_s) {
+    taper_frame_t frame;
+    sim_curve_init(curve, NULL);
+    sim_curve_set_prices(curve, &limits);
+    TEST_ASSERT_TRUE(sim_curve_next(curve, LIVE_START_S + after_s, 0, &frame));
+    TEST_ASSERT_EQUAL_UINT8(TAPER_TRANSFER_PRICE_CURVE, curve->message[1]);
+    return curve->message;
+}
+
+static void test_prices_are_told_in_thousandths_and_may_be_negative(void) {
+    static sim_curve_t curve;
+    add(-10.0, 0.2506);
+    add(100.5, -0.032);
+    const uint8_t *message = price_message_at(&curve, 0.0);
+    TEST_ASSERT_EQUAL_UINT8(3, message[2]);
+    assert_point(message, 0, 0.0, 251);
+    assert_point(message, 1, 101.0, (uint16_t)-32);
+    assert_point(message, 2, 14.0 * 86400.0, (uint16_t)-32);
+}
+
+static void test_a_constant_price_is_told_with_its_end(void) {
+    static sim_curve_t curve;
+    add(-10.0, 0.3);
+    const uint8_t *message = price_message_at(&curve, 5.0);
+    TEST_ASSERT_EQUAL_UINT8(2, message[2]);
+    assert_point(message, 0, 5.0, 300);
+    assert_point(message, 1, 5.0 + 14.0 * 86400.0, 300);
+}
+
+static void test_of_many_prices_as_many_are_told_as_a_station_keeps(void) {
+    static sim_curve_t curve;
+    for (unsigned k = 0; k < 300; k++) {
+        add(60.0 * k, 0.2 + 0.001 * (k % 2));
+    }
+    const uint8_t *message = price_message_at(&curve, 0.0);
+    TEST_ASSERT_EQUAL_UINT8(TAPER_MAX_PRICE_POINTS, message[2]);
+    assert_point(message, TAPER_MAX_PRICE_POINTS - 1, 60.0 * (TAPER_MAX_PRICE_POINTS - 1), 201);
+}
+
+static void test_limits_and_prices_reach_the_station_one_after_the_other(void) {
+    double price[] = {0.3, 0.1};
+    double at_s[] = {LIVE_START_S - 10.0, LIVE_START_S + 3600.0};
+    const sim_course_t prices = {.time_s = at_s, .value = price, .count = 2};
+    add(-10.0, 20.0);
+    add(3600.0, 10.0);
+    start_under_limits(1);
+    sim_curve_set_prices(&live.field.curve, &prices);
+    live_bench_run_ms(5000);
+    TEST_ASSERT_EQUAL_UINT32(2, live.field.curve.accepted);
+    TEST_ASSERT_EQUAL_UINT16(2, live.station.limits.curve[TAPER_CURVE_OF_GATEWAY].count);
+    TEST_ASSERT_EQUAL_UINT16(3, live.station.limits.price.count);
+    TEST_ASSERT_EQUAL_INT32(300, live.station.limits.price.point[0].milli_per_kWh);
+    TEST_ASSERT_EQUAL_INT32(100, live.station.limits.price.point[1].milli_per_kWh);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_a_fall_of_the_limit_is_known_before_it_comes);
@@ -309,5 +367,9 @@ int main(void) {
     RUN_TEST(test_limits_are_rounded_down_and_what_the_wire_cannot_say_is_its_most);
     RUN_TEST(test_a_change_within_a_second_counts_to_the_side_of_the_lower_limit);
     RUN_TEST(test_what_is_past_or_far_ahead_stays_out);
+    RUN_TEST(test_prices_are_told_in_thousandths_and_may_be_negative);
+    RUN_TEST(test_a_constant_price_is_told_with_its_end);
+    RUN_TEST(test_of_many_prices_as_many_are_told_as_a_station_keeps);
+    RUN_TEST(test_limits_and_prices_reach_the_station_one_after_the_other);
     return UNITY_END();
 }
