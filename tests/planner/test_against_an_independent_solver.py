@@ -12,37 +12,49 @@ import subprocess
 
 import numpy as np
 import pytest
-from oracle import Demand, Problem, Station, read_station
+from oracle import SPECIAL_STATIONS, Demand, Problem, Station, read_station
 
 SOLVED, INACCURATE = 2, 3  # taper_verdict_t
 DOUBLE = os.environ["TAPER_REAL"] == "double"
 TOLERANCE = 1e-3 if DOUBLE else 5e-3
 GOOD = {SOLVED} if DOUBLE else {SOLVED, INACCURATE}
-STATIONS = ["hub", "garage", "paper", "depot"]
+STATIONS = ["hub", "garage", "paper", "depot", "caltech"]
+SPECIAL = ["mixed"]
 
 
-def probe(station: Station, demands: dict[int, Demand], limit_W: list[int]) -> tuple[int, int, np.ndarray]:
+def demand_line(station: Station, i: int, d: Demand) -> str:
+    connector = station.connector[i]
+    W_per_A = connector.volts * d.conductors if d.conductors else connector.W_per_A
+    phases = sum(1 << line for line in connector.lines[: d.conductors]) if d.conductors else ""
+    return (
+        f"demand {i} 1 {d.stored_Wh} {d.capacity_Wh} {d.need_Wh} {d.peak_W} {d.taper_W} "
+        f"{connector.max_mA} {W_per_A:g} {d.departs_in_s} {phases}"
+    )
+
+
+def probe(
+    station: Station, demands: dict[int, Demand], limit_W: list[int], phase_A: list[float] | None = None
+) -> tuple[int, int, np.ndarray]:
     """Verdict, iterations and planned powers (per unit) of the firmware's planner, started cold."""
     lines = [f"station {station.name}", "limit " + " ".join(map(str, limit_W))]
-    for i, d in demands.items():
-        lines.append(
-            f"demand {i} 1 {d.stored_Wh} {d.capacity_Wh} {d.need_Wh} {d.peak_W} {d.taper_W} "
-            f"{station.max_mA[i]} {station.W_per_A[i]} {d.departs_in_s}"
-        )
+    lines += ["phases " + " ".join(f"{1000 * a:.0f}" for a in phase_A)] if phase_A else []
+    lines += [demand_line(station, i, d) for i, d in demands.items()]
+    program = os.environ["TAPER_SPECIAL_PROBE" if station.name in SPECIAL else "TAPER_PLANNER_PROBE"]
     run = subprocess.run(
-        [os.environ["TAPER_PLANNER_PROBE"]], input="\n".join(lines + ["solve", ""]), capture_output=True, text=True,
-        check=True,
+        [program], input="\n".join([*lines, "solve", ""]), capture_output=True, text=True, check=True
     )
     head, *rows = run.stdout.splitlines()
     verdict, iterations = map(int, head.split()[:2])
     return verdict, iterations, np.array([[float(u) for u in row.split()] for row in rows])
 
 
-def assert_agrees(station: Station, demands: dict[int, Demand], limit_W: list[int]) -> None:
-    verdict, iterations, power = probe(station, demands, limit_W)
+def assert_agrees(
+    station: Station, demands: dict[int, Demand], limit_W: list[int], phase_A: list[float] | None = None
+) -> None:
+    verdict, iterations, power = probe(station, demands, limit_W, phase_A)
     assert verdict in GOOD
     assert iterations <= 500
-    problem = Problem(station, demands, limit_W)
+    problem = Problem(station, demands, limit_W, phase_A)
     best = problem.least_cost()
     cost, excess = problem.judge(power)
     assert excess <= TOLERANCE
@@ -72,9 +84,9 @@ def share_of_peaks(station: Station, demands: dict[int, Demand], share: float) -
     return [int(share * sum(d.peak_W for d in demands.values()))] * station.steps
 
 
-@pytest.fixture(params=STATIONS)
+@pytest.fixture(params=STATIONS + SPECIAL)
 def station(request: pytest.FixtureRequest) -> Station:
-    return read_station(request.param)
+    return read_station(request.param, SPECIAL_STATIONS) if request.param in SPECIAL else read_station(request.param)
 
 
 @pytest.mark.parametrize("share", [0.1, 0.3, 0.7, 1.5])
