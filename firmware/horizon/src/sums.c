@@ -2,26 +2,26 @@
 
 #include <tgmath.h>
 
-static unsigned members_of(const taper_station_config_t *config, uint8_t group, taper_row_kind_t kind) {
+/** Factor of the rows of a sum. */
+static taper_real_t scale_of(const taper_station_config_t *config, uint8_t group, taper_row_kind_t kind) {
     unsigned members = 0;
     for (uint8_t i = 0; i < config->connector_count; i++) {
         members += taper_row_plans(config, group, kind, i) ? 1u : 0u;
     }
-    return members;
+    const taper_real_t scale = (taper_real_t)sqrt((taper_real_t)5 / (taper_real_t)members);
+    const bool is_current = kind != TAPER_ROW_POWER && kind < TAPER_ROW_SUMS;
+    return is_current ? scale * TAPER_CURRENT_SCALE : scale;
 }
 
 void taper_sums_list(taper_horizon_t *horizon) {
     const taper_station_config_t *config = horizon->config;
     horizon->sum_count = 0;
     for (uint8_t group = 0; group < config->group_count; group++) {
-        for (uint8_t kind = 0; kind < TAPER_ROW_KINDS; kind++) {
-            if (horizon->sum_count < TAPER_MAX_PLAN_ROWS &&
-                taper_row_is_planned(config, group, (taper_row_kind_t)kind)) {
-                const unsigned members = members_of(config, group, (taper_row_kind_t)kind);
+        for (uint8_t k = 0; k < TAPER_ROW_KINDS; k++) {
+            const taper_row_kind_t kind = (taper_row_kind_t)k;
+            if (horizon->sum_count < TAPER_MAX_PLAN_ROWS && taper_row_is_planned(config, group, kind)) {
                 horizon->sum[horizon->sum_count++] =
-                    (taper_sum_t){.group = group,
-                                  .kind = kind,
-                                  .scale = (taper_real_t)sqrt((taper_real_t)5 / (taper_real_t)members)};
+                    (taper_sum_t){.group = group, .kind = k, .scale = scale_of(config, group, kind)};
             }
         }
     }
