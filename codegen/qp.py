@@ -11,8 +11,9 @@ of step t. Rows, with v(i,-1) = 0:
     target  N*T + N*(T-1) + i            0.58 v(i,T-1)
     sum     N*T + N*(T-1) + N + r*T + t  s_r * sum of c_ri (v(i,t) - v(i,t-1)) over the n_r connectors in row r
 
-with s_r = sqrt(5 / n_r). c_ri is what the row counts per power of the connector: supply power, or current times the site's
-voltage. The factors 0.58 and s_r make the rows alike in size, which OSQP's convergence depends on.
+with s_r = sqrt(5 / n_r); for sums of currents 0.4 sqrt(5 / sum of c_ri^2). c_ri is what the row counts per power of the
+connector: supply power, or current times the site's voltage. The factors 0.58 and s_r make the rows alike in size, which
+OSQP's convergence depends on.
 
 In the compressed columns the entries stand by ascending row. Column v(i,t) of A is therefore
 
@@ -29,11 +30,12 @@ from math import sqrt
 import numpy as np
 from scipy import sparse
 
-from rows import POWER, Row, planned_rows
+from rows import DIFFERENCES, POWER, Row, planned_rows
 from station import Station
 
 TARGET_FACTOR = 0.58
 SUM_FACTOR_CONNECTORS = 5.0  # s_r is 1 for a row of this many
+CURRENT_FACTOR = 0.4  # of sums of currents besides: there are several for one of power, and they bind together
 TAPER = 0.03  # a: fall of the power per energy, per unit
 POWER_COST = 0.1  # q
 DISCOUNT = 0.95  # g, per step
@@ -98,9 +100,12 @@ def constraint_matrix(station: Station) -> sparse.csc_matrix:
 
 def sum_factors(station: Station, row: Row) -> dict[int, float]:
     """s_r c_ri of the connectors in a row, all conductors in use."""
-    scale = sqrt(SUM_FACTOR_CONNECTORS / len(row.weights))
     reference = 1.0 if row.kind == POWER else station.site_voltage_mV / 1000  # makes a row of currents one of powers
-    return {i: scale * (weight * reference / _drawn_W_per_A(station, i)) for i, weight in row.weights.items()}
+    factors = {i: weight * reference / _drawn_W_per_A(station, i) for i, weight in row.weights.items()}
+    scale = sqrt(SUM_FACTOR_CONNECTORS / len(factors))
+    if row.kind != POWER and row.kind not in DIFFERENCES:
+        scale = CURRENT_FACTOR * sqrt(SUM_FACTOR_CONNECTORS / sum(factor**2 for factor in factors.values()))
+    return {i: scale * factor for i, factor in factors.items()}
 
 
 def _drawn_W_per_A(station: Station, i: int) -> float:

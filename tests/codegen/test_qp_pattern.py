@@ -6,6 +6,7 @@ from math import sqrt
 import numpy as np
 import pytest
 import qp
+from rows import planned_rows
 from station import Connector, Group, Station
 
 N, T = 3, 3
@@ -70,6 +71,33 @@ def test_the_cost_is_that_of_the_discounted_power(station: Station) -> None:
     cost = (0.1 / 2 * 0.95 ** np.arange(1, T + 1) * rates**2).sum()
     assert v @ full @ v / 2 == pytest.approx(cost)
     assert p.indices.tolist()[:5] == [0, 0, 1, 1, 2]
+
+
+def test_limits_of_phases_are_rows_of_those_who_draw_from_them(station: Station) -> None:
+    """Connector 0 on L1, 1 between L2 and L3, 2 a converter: 400 V at 0.95 are 422 W, or 0.612 A on each phase."""
+    site, feeder = station.groups
+    groups = (replace(site, limit_mA=100_000), replace(feeder, limit_W=0, delta_mA=50_000, imbalance_mA=9_000))
+    first, second, third = station.connectors
+    second = replace(second, voltage_mV=400_000, rotation="231", line_to_line=True)
+    third = replace(third, kind="DC", voltage_mV=400_000, efficiency_permille=950)
+    rows = planned_rows(replace(station, groups=groups, connectors=(first, second, third)))
+    assert [(row.group, row.kind, row.weights) for row in rows] == [
+        (0, "POWER", {0: 230, 1: 400, 2: 422}),
+        (0, "L1", {0: 1, 2: 0.612}),
+        (0, "L2", {1: 1, 2: 0.612}),
+        (0, "L3", {1: 0.733, 2: 0.612}),
+        (0, "L1_B", {0: 1, 2: 0.612}),
+        (0, "L2_B", {1: 0.733, 2: 0.612}),
+        (0, "L3_B", {1: 1, 2: 0.612}),
+        (1, "DELTA_L1", {0: 1}),
+        (1, "DELTA_L2", {0: 1, 1: 1}),
+        (1, "DELTA_L3", {1: 2}),
+        (1, "DELTA_L1_B", {0: 1, 1: 1}),
+        (1, "DELTA_L2_B", {0: 1}),
+        (1, "DELTA_L3_B", {1: 2}),
+        (1, "L1_L2", {0: 1, 1: -1}),
+        (1, "L3_L1", {0: -1, 1: 1}),
+    ]
 
 
 def test_no_row_begins_as_an_equality(station: Station) -> None:

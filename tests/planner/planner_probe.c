@@ -5,12 +5,14 @@
  *     station NAME                starts cold
  *     time MS                     of the snapshot; 0 if not given
  *     limit W0 .. W(T-1)
- *     demand CONNECTOR SESSION stored_Wh capacity_Wh need_Wh peak_W taper_W max_mA W_per_A departs_in_s
+ *     phases mA mA mA             what other load leaves on each; as described if not given
+ *     demand CONNECTOR SESSION stored_Wh capacity_Wh need_Wh peak_W taper_W max_mA W_per_A departs_in_s [PHASES]
  *     solve
  *
  * `solve` prints "VERDICT ITERATIONS MICROSECONDS" and then T planned powers (per unit) a line for every connector. With
  * --numbers, the lines are instead those of the problem itself: linear cost, lower and upper bounds, and the taper
- * factors. Limits and demands are then forgotten, the warm start is not.
+ * factors. PHASES has a bit for each phase of the supply that the vehicle draws from; without it, the description says.
+ * Limits and demands are then forgotten, the warm start is not.
  */
 #define _POSIX_C_SOURCE 199309L
 
@@ -25,7 +27,7 @@
 
 static taper_planner_t planner;
 static taper_snapshot_t snapshot;
-static taper_course_t course = {.phase_mA = {TAPER_NO_LIMIT, TAPER_NO_LIMIT, TAPER_NO_LIMIT}};
+static taper_course_t course;
 static const taper_station_config_t *config;
 
 static void fail(const char *line) {
@@ -57,16 +59,31 @@ static void read_limits(char *line) {
     }
 }
 
+static void forget_phases(void) {
+    for (unsigned k = 0; k < 3; k++) {
+        course.phase_mA[k] = TAPER_NO_LIMIT;
+    }
+}
+
+static void read_phases(const char *line) {
+    if (sscanf(line, "phases %d %d %d", &course.phase_mA[0], &course.phase_mA[1], &course.phase_mA[2]) != 3) {
+        fail(line);
+    }
+}
+
 static void read_demand(const char *line) {
     int i = 0;
-    unsigned session = 0;
+    unsigned session = 0, phases = 0;
     taper_demand_t d = {.active = true};
-    if (sscanf(line, "demand %d %u %d %d %d %d %d %d %d %d", &i, &session, &d.stored_Wh, &d.capacity_Wh,
-               &d.need_Wh, &d.peak_W, &d.taper_W, &d.max_mA, &d.W_per_A, &d.departs_in_s) != 10 ||
+    if (sscanf(line, "demand %d %u %d %d %d %d %d %d %d %d %u", &i, &session, &d.stored_Wh, &d.capacity_Wh,
+               &d.need_Wh, &d.peak_W, &d.taper_W, &d.max_mA, &d.W_per_A, &d.departs_in_s, &phases) < 10 ||
         i < 0 || i >= config->connector_count) {
         fail(line);
     }
     d.session = (uint8_t)session;
+    if (phases != 0) {
+        d.booking = (taper_booking_t){.W_per_A = d.W_per_A, .permille = 1000, .phases = (uint8_t)phases};
+    }
     snapshot.demand[i] = d;
 }
 
@@ -115,11 +132,13 @@ static void solve(bool numbers) {
         print_plan();
     }
     memset(&snapshot, 0, sizeof snapshot);
+    forget_phases();
 }
 
 int main(int argc, char **argv) {
     static char line[4096];
     const bool numbers = argc == 2 && strcmp(argv[1], "--numbers") == 0;
+    forget_phases();
     while (fgets(line, sizeof line, stdin) != NULL) {
         if (strncmp(line, "station", 7) == 0) {
             select_station(line);
@@ -129,6 +148,8 @@ int main(int argc, char **argv) {
             snapshot.now_ms = (uint32_t)strtoul(line + 4, NULL, 10);
         } else if (strncmp(line, "limit", 5) == 0) {
             read_limits(line);
+        } else if (strncmp(line, "phases", 6) == 0) {
+            read_phases(line);
         } else if (strncmp(line, "demand", 6) == 0) {
             read_demand(line);
         } else if (strncmp(line, "solve", 5) == 0) {

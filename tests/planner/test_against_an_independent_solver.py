@@ -9,40 +9,54 @@ from __future__ import annotations
 import os
 import random
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from oracle import Demand, Problem, Station, read_station
+from oracle import STATIONS as DESCRIPTIONS
+from oracle import SPECIAL_STATIONS, Demand, Problem, Station, read_station
 
 SOLVED, INACCURATE = 2, 3  # taper_verdict_t
 DOUBLE = os.environ["TAPER_REAL"] == "double"
 TOLERANCE = 1e-3 if DOUBLE else 5e-3
 GOOD = {SOLVED} if DOUBLE else {SOLVED, INACCURATE}
-STATIONS = ["hub", "garage", "paper", "depot"]
+STATIONS = ["hub", "garage", "paper", "depot", "caltech"]
+SPECIAL = ["mixed"]
 
 
-def probe(station: Station, demands: dict[int, Demand], limit_W: list[int]) -> tuple[int, int, np.ndarray]:
+def demand_line(station: Station, i: int, d: Demand) -> str:
+    connector = station.connector[i]
+    W_per_A = connector.volts * d.conductors if d.conductors else connector.W_per_A
+    phases = sum(1 << line for line in connector.lines[: d.conductors]) if d.conductors else ""
+    return (
+        f"demand {i} 1 {d.stored_Wh} {d.capacity_Wh} {d.need_Wh} {d.peak_W} {d.taper_W} "
+        f"{connector.max_mA} {W_per_A:g} {d.departs_in_s} {phases}"
+    )
+
+
+def probe(
+    station: Station, demands: dict[int, Demand], limit_W: list[int], phase_A: list[float] | None = None
+) -> tuple[int, int, np.ndarray]:
     """Verdict, iterations and planned powers (per unit) of the firmware's planner, started cold."""
     lines = [f"station {station.name}", "limit " + " ".join(map(str, limit_W))]
-    for i, d in demands.items():
-        lines.append(
-            f"demand {i} 1 {d.stored_Wh} {d.capacity_Wh} {d.need_Wh} {d.peak_W} {d.taper_W} "
-            f"{station.max_mA[i]} {station.W_per_A[i]} {d.departs_in_s}"
-        )
+    lines += ["phases " + " ".join(f"{1000 * a:.0f}" for a in phase_A)] if phase_A else []
+    lines += [demand_line(station, i, d) for i, d in demands.items()]
+    program = os.environ["TAPER_SPECIAL_PROBE" if station.name in SPECIAL else "TAPER_PLANNER_PROBE"]
     run = subprocess.run(
-        [os.environ["TAPER_PLANNER_PROBE"]], input="\n".join(lines + ["solve", ""]), capture_output=True, text=True,
-        check=True,
+        [program], input="\n".join([*lines, "solve", ""]), capture_output=True, text=True, check=True
     )
     head, *rows = run.stdout.splitlines()
     verdict, iterations = map(int, head.split()[:2])
     return verdict, iterations, np.array([[float(u) for u in row.split()] for row in rows])
 
 
-def assert_agrees(station: Station, demands: dict[int, Demand], limit_W: list[int]) -> None:
-    verdict, iterations, power = probe(station, demands, limit_W)
+def assert_agrees(
+    station: Station, demands: dict[int, Demand], limit_W: list[int], phase_A: list[float] | None = None
+) -> None:
+    verdict, iterations, power = probe(station, demands, limit_W, phase_A)
     assert verdict in GOOD
     assert iterations <= 500
-    problem = Problem(station, demands, limit_W)
+    problem = Problem(station, demands, limit_W, phase_A)
     best = problem.least_cost()
     cost, excess = problem.judge(power)
     assert excess <= TOLERANCE
@@ -140,6 +154,54 @@ def test_without_tapers(station: Station) -> None:
     rng = random.Random(f"{station.name} flat")
     demands = {i: Demand(**{**vars(d), "taper_W": 0}) for i, d in fleet(rng, station, station.connectors).items()}
     assert_agrees(station, demands, share_of_peaks(station, demands, 0.3))
+
+
+@pytest.mark.parametrize("share", [0.3, 0.7, 1.5])
+@pytest.mark.parametrize("occupied", [0.2, 0.6, 1.0])
+def test_every_wiring_below_every_kind_of_limit(occupied: float, share: float) -> None:
+    station = read_station("mixed", SPECIAL_STATIONS)
+    rng = random.Random(f"{station.name} {occupied} {share}")
+    demands = fleet(rng, station, max(1, int(station.connectors * occupied)))
+    assert_agrees(station, demands, share_of_peaks(station, demands, share))
+
+
+@pytest.mark.parametrize("name", ["hub", "depot"])
+def test_vehicles_that_use_one_conductor_of_three_on_every_phase(name: str) -> None:
+    station = read_station(name)
+    rng = random.Random(f"{name} one conductor")
+    demands = fleet(rng, station, station.connectors)
+    demands = {i: replace(d, conductors=1) if i % 2 else d for i, d in demands.items()}
+    assert_agrees(station, demands, share_of_peaks(station, demands, 0.8))
+
+
+@pytest.mark.parametrize("name", ["hub", "depot", "caltech"])
+def test_other_load_leaves_less_of_some_phases(name: str) -> None:
+    station = read_station(name)
+    rng = random.Random(f"{station.name} other load")
+    demands = fleet(rng, station, station.connectors)
+    phase_A = [0.6 * sum(d.peak_W for d in demands.values()) / (3 * station.volts) * k for k in (0.7, 1.0, 1.3)]
+    limit_W = share_of_peaks(station, demands, 0.9)
+    best, free = (Problem(station, demands, limit_W, phases).least_cost() for phases in (phase_A, None))
+    assert free < best - 2 * TOLERANCE * abs(best)  # it is the phases that limit
+    assert_agrees(station, demands, limit_W, phase_A)
+
+
+@pytest.mark.parametrize(
+    ("name", "connectors", "limit"),
+    [("caltech", range(54), {"delta_A": None}), ("mixed", range(3), {"imbalance_A": None})],
+    ids=["delta", "imbalance"],
+)
+def test_limits_of_the_delta_side_and_of_imbalance_bind(name: str, connectors: range, limit: dict[str, None]) -> None:
+    """Where the comparison says something of these rows: the optimum is another without them. Sockets 0 to 2 are on L1."""
+    station = read_station(name, SPECIAL_STATIONS if name in SPECIAL else DESCRIPTIONS)
+    rng = random.Random(f"{name} binds")
+    eager = {i: replace(vehicle(rng, station, 0.1), need_Wh=20_000, departs_in_s=20_000) for i in connectors}
+    limit_W = share_of_peaks(station, eager, 1.5)
+    best = Problem(station, eager, limit_W).least_cost()
+    groups = [replace(group, **limit) for group in station.groups]
+    free = Problem(replace(station, groups=groups), eager, limit_W).least_cost()
+    assert free < best - 2 * TOLERANCE * abs(best)
+    assert_agrees(station, eager, limit_W)
 
 
 def test_unknown_capacities_mean_flat_limits(station: Station) -> None:

@@ -38,6 +38,8 @@
 #define TAPER_CURVATURE ((taper_real_t)0.1)
 /** Factor of the target rows. */
 #define TAPER_TARGET_SCALE ((taper_real_t)0.58)
+/** Factor of the rows of currents besides: there are several for one of power, which bind together. */
+#define TAPER_CURRENT_SCALE ((taper_real_t)0.4)
 
 #define TAPER_MAX_VARIABLES (TAPER_MAX_CONNECTORS * TAPER_MAX_STEPS)
 #define TAPER_MAX_ROWS      (2 * TAPER_MAX_VARIABLES + TAPER_MAX_PLAN_ROWS * TAPER_MAX_STEPS)
@@ -46,7 +48,7 @@
 typedef struct {
     uint8_t group;
     uint8_t kind;       /**< taper_row_kind_t */
-    taper_real_t scale; /**< factor of its rows: sqrt(5 / connectors in it) */
+    taper_real_t scale; /**< factor of its rows, which makes them alike in size (codegen/qp.py) */
 } taper_sum_t;
 
 typedef struct {
