@@ -169,6 +169,10 @@ static void test_three_phases_are_never_cut(void) {
     balance();
     TEST_ASSERT_EQUAL_INT32(32000, tree.setpoints.current_mA[0]);
     TEST_ASSERT_EQUAL_INT32(8000, tree.setpoints.current_mA[1]);
+    tree.group[0].imbalance_mA = 5000; /* not even where another has to go off for it */
+    balance();
+    TEST_ASSERT_EQUAL_INT32(32000, tree.setpoints.current_mA[0]);
+    TEST_ASSERT_EQUAL_INT32(0, tree.setpoints.current_mA[1]);
 }
 
 static void test_each_group_is_balanced_by_its_own_connectors(void) {
