@@ -320,17 +320,20 @@ static void test_decreases_count_when_they_are_proven(void) {
 
 static void test_a_delta_line_that_is_above_its_limit_by_one_pair_gets_no_more_of_another(void) {
     const uint8_t rank[CONNECTORS] = {0, 1, 2, 3, 4, 5};
-    const taper_setpoints_t target = {{6000, 0, 0, 6000}};
+    const taper_setpoints_t target = {{6000, 0, 0, 6000, 6000}};
     for (uint8_t i = 0; i < 3; i++) {
         put_between(i, i);
     }
+    connectors[3].group = 1; /* from line 1 to neutral: that is not on line c */
     groups[1].delta_mA = 30000;
     may_draw(1, 12000);
     may_draw(2, 6100); /* line c: CA + 2 BC are 0.1 A too much, AB + 2 BC are not; all three: 30.05 A */
     taper_ledger_grant(&ledger, &config, &snapshot, rank, &supply, &target, &granted);
     TEST_ASSERT_EQUAL_INT32(0, granted.current_mA[0]);
-    TEST_ASSERT_EQUAL_INT32(6000, granted.current_mA[3]); /* another group */
+    TEST_ASSERT_EQUAL_INT32(6000, granted.current_mA[3]);
+    TEST_ASSERT_EQUAL_INT32(6000, granted.current_mA[4]); /* another group */
     grant(0, 6000);
+    grant(3, 0);
     TEST_ASSERT_FALSE(passes());
     groups[1].delta_mA = 30100;
     taper_ledger_grant(&ledger, &config, &snapshot, rank, &supply, &target, &granted);
