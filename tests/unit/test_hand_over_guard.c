@@ -124,6 +124,33 @@ static void test_a_converter_counts_with_its_losses_on_all_phases(void) {
     assert_bound(1, 3060);
 }
 
+static void test_a_converter_whose_numbers_are_whole_is_not_rounded(void) {
+    connectors[0].is_dc = true;
+    connectors[0].voltage_mV = 345000; /* half of 690 V */
+    groups[0].limit_W = 3450;
+    assert_bound(0, 10000);
+    groups[0].limit_W = 1000000;
+    groups[0].limit_mA = 5000;
+    assert_bound(0, 10000);
+}
+
+static void test_a_connector_between_lines_is_on_the_two_that_its_rotation_names_first(void) {
+    static const uint8_t third[7] = {TAPER_ROTATION_312, TAPER_ROTATION_312, TAPER_ROTATION_123,
+                                     TAPER_ROTATION_231, TAPER_ROTATION_231, TAPER_ROTATION_312,
+                                     TAPER_ROTATION_123}; /* a wiring that begins with the other line */
+    groups[1].limit_mA = 16000;
+    connectors[0].line_to_line = true;
+    config.line_to_line = true;
+    grant(0, 10000);
+    for (uint8_t rotation = 0; rotation < 7; rotation++) {
+        connectors[0].rotation = rotation;
+        for (uint8_t line = TAPER_ROTATION_123; line <= TAPER_ROTATION_312; line++) {
+            connectors[1].rotation = line;
+            assert_bound(1, line == third[rotation] ? 16000 : 6000);
+        }
+    }
+}
+
 static void test_each_phase_counts_who_is_wired_to_it(void) {
     static const uint8_t rotation[3] = {TAPER_ROTATION_UNKNOWN, TAPER_ROTATION_213, TAPER_ROTATION_312};
     groups[1].limit_mA = 16000;
@@ -402,6 +429,8 @@ int main(void) {
     RUN_TEST(test_power_is_bounded_by_every_group_and_the_supply);
     RUN_TEST(test_the_power_of_one_ampere_is_as_it_is_booked);
     RUN_TEST(test_a_converter_counts_with_its_losses_on_all_phases);
+    RUN_TEST(test_a_converter_whose_numbers_are_whole_is_not_rounded);
+    RUN_TEST(test_a_connector_between_lines_is_on_the_two_that_its_rotation_names_first);
     RUN_TEST(test_each_phase_counts_who_is_wired_to_it);
     RUN_TEST(test_three_phases_count_on_each_and_with_single_ones);
     RUN_TEST(test_phases_that_were_told_count_instead_of_the_described_ones);
