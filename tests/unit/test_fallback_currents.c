@@ -9,7 +9,7 @@
 #define EXPIRED_ms  (VALIDITY_ms + TAPER_LEDGER_LATE_ms)
 #define START_ms    (UINT32_MAX - 1000u)
 
-static taper_connector_config_t connectors[4];
+static taper_connector_config_t connectors[5]; /* the last one is not there */
 static taper_station_config_t config;
 static taper_ledger_t ledger;
 static taper_snapshot_t snapshot;
@@ -23,7 +23,9 @@ static const taper_evse_status_t empty = {.pilot = TAPER_PILOT_A};
 void setUp(void) {
     const int32_t configured_mA[4] = {10000, 10000, 8000, 6000};
     now_ms = START_ms;
-    memcpy(connectors, scene_four()->connectors, sizeof connectors);
+    memcpy(connectors, scene_four()->connectors, 4 * sizeof connectors[0]);
+    connectors[4] = connectors[0];
+    connectors[4].fallback_mA = 10000;
     config = *scene_four();
     config.connectors = connectors;
     snapshot = scene_snapshot(now_ms, 4);
@@ -47,6 +49,7 @@ static int32_t W_of_dA(int32_t current_dA) {
 
 static void choose(int32_t failsafe_W) {
     memset(&fallback, 0x55, sizeof fallback);
+    fallback.current_mA[4] = 0;
     taper_ledger_grant_fallback(&ledger, &config, &snapshot, rank, failsafe_W, &granted, &fallback);
     TEST_ASSERT_TRUE(
         taper_guard_fallback_passes(&ledger, &config, &snapshot, failsafe_W, &granted, &fallback));
@@ -241,6 +244,18 @@ static void test_a_rank_that_names_nobody_or_one_twice_harms_nobody(void) {
     send_and_echo_all();
     choose(W_of_dA(100));
     assert_chosen(0, 10000, 0, 0);
+    TEST_ASSERT_EQUAL_INT32(0, fallback.current_mA[4]);
+}
+
+static void test_who_is_not_there_is_left_alone(void) {
+    rank[0] = 4;
+    granted.current_mA[4] = 32000;
+    ledger.entry[4].last_fallback_mA = 10000;
+    choose(10000);
+    TEST_ASSERT_EQUAL_INT32(0, fallback.current_mA[4]);
+    fallback.current_mA[4] = 777;
+    taper_ledger_grant_fallback(&ledger, &config, &snapshot, rank, 0, &granted, &fallback);
+    TEST_ASSERT_EQUAL_INT32(777, fallback.current_mA[4]);
 }
 
 static void test_a_connector_that_costs_nothing_is_bounded_by_nothing(void) {
@@ -334,6 +349,7 @@ int main(void) {
     RUN_TEST(test_after_a_start_what_an_earlier_life_told_counts_until_it_is_heard_to_be_over);
     RUN_TEST(test_power_counts_as_it_is_booked);
     RUN_TEST(test_a_rank_that_names_nobody_or_one_twice_harms_nobody);
+    RUN_TEST(test_who_is_not_there_is_left_alone);
     RUN_TEST(test_a_connector_that_costs_nothing_is_bounded_by_nothing);
     RUN_TEST(test_the_guard_refuses_what_is_above_its_setpoint_or_below_nothing);
     RUN_TEST(test_the_guard_refuses_a_sum_above_the_limit_unless_it_was_as_high_before);

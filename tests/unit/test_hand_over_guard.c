@@ -124,6 +124,33 @@ static void test_a_converter_counts_with_its_losses_on_all_phases(void) {
     assert_bound(1, 3060);
 }
 
+static void test_a_converter_whose_numbers_are_whole_is_not_rounded(void) {
+    connectors[0].is_dc = true;
+    connectors[0].voltage_mV = 345000; /* half of 690 V */
+    groups[0].limit_W = 3450;
+    assert_bound(0, 10000);
+    groups[0].limit_W = 1000000;
+    groups[0].limit_mA = 5000;
+    assert_bound(0, 10000);
+}
+
+static void test_a_connector_between_lines_is_on_the_two_that_its_rotation_names_first(void) {
+    static const uint8_t third[7] = {TAPER_ROTATION_312, TAPER_ROTATION_312, TAPER_ROTATION_123,
+                                     TAPER_ROTATION_231, TAPER_ROTATION_231, TAPER_ROTATION_312,
+                                     TAPER_ROTATION_123}; /* a wiring that begins with the other line */
+    groups[1].limit_mA = 16000;
+    connectors[0].line_to_line = true;
+    config.line_to_line = true;
+    grant(0, 10000);
+    for (uint8_t rotation = 0; rotation < 7; rotation++) {
+        connectors[0].rotation = rotation;
+        for (uint8_t line = TAPER_ROTATION_123; line <= TAPER_ROTATION_312; line++) {
+            connectors[1].rotation = line;
+            assert_bound(1, line == third[rotation] ? 16000 : 6000);
+        }
+    }
+}
+
 static void test_each_phase_counts_who_is_wired_to_it(void) {
     static const uint8_t rotation[3] = {TAPER_ROTATION_UNKNOWN, TAPER_ROTATION_213, TAPER_ROTATION_312};
     groups[1].limit_mA = 16000;
@@ -320,17 +347,20 @@ static void test_decreases_count_when_they_are_proven(void) {
 
 static void test_a_delta_line_that_is_above_its_limit_by_one_pair_gets_no_more_of_another(void) {
     const uint8_t rank[CONNECTORS] = {0, 1, 2, 3, 4, 5};
-    const taper_setpoints_t target = {{6000, 0, 0, 6000}};
+    const taper_setpoints_t target = {{6000, 0, 0, 6000, 6000}};
     for (uint8_t i = 0; i < 3; i++) {
         put_between(i, i);
     }
+    connectors[3].group = 1; /* from line 1 to neutral: that is not on line c */
     groups[1].delta_mA = 30000;
     may_draw(1, 12000);
     may_draw(2, 6100); /* line c: CA + 2 BC are 0.1 A too much, AB + 2 BC are not; all three: 30.05 A */
     taper_ledger_grant(&ledger, &config, &snapshot, rank, &supply, &target, &granted);
     TEST_ASSERT_EQUAL_INT32(0, granted.current_mA[0]);
-    TEST_ASSERT_EQUAL_INT32(6000, granted.current_mA[3]); /* another group */
+    TEST_ASSERT_EQUAL_INT32(5800, granted.current_mA[3]); /* line a: BC + 2 CA are 24.2 A */
+    TEST_ASSERT_EQUAL_INT32(6000, granted.current_mA[4]); /* another group */
     grant(0, 6000);
+    grant(3, 0);
     TEST_ASSERT_FALSE(passes());
     groups[1].delta_mA = 30100;
     taper_ledger_grant(&ledger, &config, &snapshot, rank, &supply, &target, &granted);
@@ -399,6 +429,8 @@ int main(void) {
     RUN_TEST(test_power_is_bounded_by_every_group_and_the_supply);
     RUN_TEST(test_the_power_of_one_ampere_is_as_it_is_booked);
     RUN_TEST(test_a_converter_counts_with_its_losses_on_all_phases);
+    RUN_TEST(test_a_converter_whose_numbers_are_whole_is_not_rounded);
+    RUN_TEST(test_a_connector_between_lines_is_on_the_two_that_its_rotation_names_first);
     RUN_TEST(test_each_phase_counts_who_is_wired_to_it);
     RUN_TEST(test_three_phases_count_on_each_and_with_single_ones);
     RUN_TEST(test_phases_that_were_told_count_instead_of_the_described_ones);

@@ -271,7 +271,9 @@ static void test_a_rank_that_names_nobody_or_one_twice_harms_nobody(void) {
     rank[1] = 0;
     rank[2] = 0;
     rank[3] = TAPER_MAX_CONNECTORS - 1;
+    granted.current_mA[4] = 777;
     grant(9200);
+    TEST_ASSERT_EQUAL_INT32(777, granted.current_mA[4]);
     TEST_ASSERT_EQUAL_INT32(16000, granted.current_mA[0]);
     TEST_ASSERT_EQUAL_INT32(0, granted.current_mA[1]);
 }

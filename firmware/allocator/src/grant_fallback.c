@@ -31,7 +31,7 @@ static int32_t wanted_mA(const choice_t *choice, uint8_t i) {
 
 /** Most current that `room_mW` holds. */
 static int32_t held_mA(int64_t room_mW, int32_t W_per_A) {
-    return W_per_A <= 0 ? INT32_MAX : taper_saturate_i32(room_mW / W_per_A);
+    return W_per_A == 0 ? INT32_MAX : taper_saturate_i32(room_mW / W_per_A);
 }
 
 /** Tell it again what it was told last, as far as all of these fit together. */
@@ -62,7 +62,7 @@ void taper_ledger_grant_fallback(const taper_ledger_t *ledger, const taper_stati
                                  const taper_snapshot_t *snapshot, const uint8_t *rank, int32_t failsafe_W,
                                  const taper_setpoints_t *granted, taper_setpoints_t *fallback) {
     const choice_t choice = {ledger, config, snapshot, granted, fallback};
-    const int64_t failsafe_mW = (int64_t)taper_max_i32(failsafe_W, 0) * 1000;
+    const int64_t failsafe_mW = (int64_t)failsafe_W * 1000;
     int64_t budget_mW = failsafe_mW;
     int64_t room_mW = failsafe_mW;
     for (uint8_t i = 0; i < config->connector_count; i++) {
