@@ -107,7 +107,8 @@ static void propose(taper_station_t *station, taper_mode_t mode) {
     }
 }
 
-/** What a connector draws beside its target: all of it if it cannot be told anything, or else what it takes too much. */
+/** What a connector draws beside its target: all of it if it cannot be told anything, or else what it takes too much, and
+    the fallback current of one that is heard but does not hear us. */
 static int32_t reserve_mA(const taper_station_t *station, uint8_t i, uint32_t now_ms) {
     const bool obeys =
         taper_session_is_online(&station->sessions, i, now_ms) && station->draw[i].state == TAPER_DRAW_NORMAL;
@@ -115,7 +116,8 @@ static int32_t reserve_mA(const taper_station_t *station, uint8_t i, uint32_t no
         return taper_ledger_may_mA(&station->ledger, i);
     }
     const int32_t drawn_mA = station->ledger.entry[i].drawn_mA;
-    return taper_max_i32(drawn_mA - taper_ledger_told_mA(&station->ledger, i), 0);
+    return taper_max_i32(drawn_mA - taper_ledger_told_mA(&station->ledger, i),
+                         taper_ledger_unreached_mA(&station->ledger, i));
 }
 
 /** Currents for the proposal that hold every limit, once all connectors have followed. */
