@@ -41,7 +41,20 @@ def planned_rows(station: Station) -> list[Row]:
             weights = {i: weight for i, weight in weights.items() if weight != 0}
             if weights:
                 rows.append(Row(number, kind, weights))
-    return rows
+    return [row for row in rows if not any(_implies(other, row) for other in rows)]
+
+
+def _implies(other: Row, row: Row) -> bool:
+    """Whether no connector weighs more in `row` than in `other`, a line of the same group; of equals the first stays.
+
+    Not at the site: its lines differ by what else it draws.
+    """
+    alike = any({other.kind, row.kind} <= set(family) for family in (LINES + LINES_B, DELTA + DELTA_B))
+    if not alike or other is row or other.group != row.group or row.group == 0:
+        return False
+    if any(weight > other.weights.get(i, 0.0) for i, weight in row.weights.items()):
+        return False
+    return row.weights != other.weights or KINDS.index(other.kind) < KINDS.index(row.kind)
 
 
 def _limited_kinds(group: Group, line_to_line: bool) -> list[str]:

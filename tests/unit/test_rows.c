@@ -325,6 +325,33 @@ static void test_rows_are_planned_where_a_limit_meets_a_connector(void) {
     TEST_ASSERT_TRUE(taper_row_is_planned(&station, 2, TAPER_ROW_L3));
 }
 
+static void test_of_lines_of_a_feeder_that_carry_the_same_one_is_planned(void) {
+    static const taper_connector_config_t sockets[] = {
+        {.voltage_mV = 230000, .phases = 3, .rotation = TAPER_ROTATION_231, .group = 1},
+        {.voltage_mV = 230000, .phases = 1, .rotation = TAPER_ROTATION_231, .group = 1},
+    };
+    static const taper_group_config_t groups[] = {
+        {.limit_W = 69000, .limit_mA = 100000, .parent = TAPER_NO_GROUP},
+        {.limit_W = 69000, .limit_mA = 100000, .imbalance_mA = 20000, .parent = 0},
+    };
+    taper_station_config_t feeder = station;
+    feeder.connectors = sockets;
+    feeder.connector_count = 2;
+    feeder.groups = groups;
+    feeder.group_count = 2;
+    feeder.line_to_line = false;
+    TEST_ASSERT_TRUE(taper_row_is_planned(&feeder, 1, TAPER_ROW_POWER));
+    TEST_ASSERT_FALSE(taper_row_is_planned(&feeder, 1, TAPER_ROW_L1));
+    TEST_ASSERT_TRUE(taper_row_is_planned(&feeder, 1, TAPER_ROW_L2)); /* both */
+    TEST_ASSERT_FALSE(taper_row_is_planned(&feeder, 1, TAPER_ROW_L3));
+    TEST_ASSERT_TRUE(taper_row_is_planned(&feeder, 1, TAPER_ROW_L1_L2)); /* a difference is never implied */
+    TEST_ASSERT_TRUE(taper_row_is_planned(&feeder, 0, TAPER_ROW_L1));    /* nor a line of the site */
+    TEST_ASSERT_TRUE(taper_row_is_planned(&feeder, 0, TAPER_ROW_L3));
+    feeder.connector_count = 1; /* all three carry the same: the first is planned */
+    TEST_ASSERT_TRUE(taper_row_is_planned(&feeder, 1, TAPER_ROW_L1));
+    TEST_ASSERT_FALSE(taper_row_is_planned(&feeder, 1, TAPER_ROW_L2));
+}
+
 static void test_a_planned_row_has_those_below_its_group_with_a_weight(void) {
     TEST_ASSERT_TRUE(taper_row_plans(&station, 0, TAPER_ROW_L3, PLAIN));
     TEST_ASSERT_FALSE(taper_row_plans(&station, 0, TAPER_ROW_L2, PLAIN));
@@ -357,6 +384,7 @@ int main(void) {
     RUN_TEST(test_what_the_snapshot_leaves_open_is_by_the_description);
     RUN_TEST(test_a_demand_on_direct_current_counts_with_its_losses);
     RUN_TEST(test_rows_are_planned_where_a_limit_meets_a_connector);
+    RUN_TEST(test_of_lines_of_a_feeder_that_carry_the_same_one_is_planned);
     RUN_TEST(test_a_planned_row_has_those_below_its_group_with_a_weight);
     RUN_TEST(test_a_group_contains_what_hangs_below_it);
     return UNITY_END();

@@ -191,14 +191,45 @@ bool taper_row_plans(const taper_station_config_t *config, uint8_t group, taper_
     return taper_row_weight(&booking, kind) != 0;
 }
 
-bool taper_row_is_planned(const taper_station_config_t *config, uint8_t group, taper_row_kind_t kind) {
-    if (taper_row_limit(config, group, kind) == TAPER_NO_LIMIT) {
-        return false;
-    }
+static bool has_members(const taper_station_config_t *config, uint8_t group, taper_row_kind_t kind) {
     for (uint8_t i = 0; i < config->connector_count; i++) {
         if (taper_row_plans(config, group, kind, i)) {
             return true;
         }
     }
     return false;
+}
+
+/** Whether no connector weighs more in a row than in `other`, which has the same bound; of equals the first stays. */
+static bool implies(const taper_station_config_t *config, uint8_t group, taper_row_kind_t other,
+                    taper_row_kind_t kind) {
+    bool equal = true;
+    for (uint8_t i = 0; i < config->connector_count; i++) {
+        const taper_booking_t booking = taper_booking_nominal(config, i);
+        const int32_t weight = taper_row_weight(&booking, kind);
+        const int32_t other_weight = taper_row_weight(&booking, other);
+        if (taper_group_contains(config, group, i) && weight > other_weight) {
+            return false;
+        }
+        equal = equal && (weight == other_weight || !taper_group_contains(config, group, i));
+    }
+    return !equal || other < kind;
+}
+
+/** Whether another line of the group says as much. Not at the site: its lines differ by what else it draws. */
+static bool is_implied(const taper_station_config_t *config, uint8_t group, taper_row_kind_t kind) {
+    const place_t place = place_of(kind);
+    for (int other = 0; group != 0 && other < TAPER_ROW_SUMS; other++) {
+        const bool is_alike = place_of((taper_row_kind_t)other).family == place.family &&
+                              taper_row_limit(config, group, (taper_row_kind_t)other) != TAPER_NO_LIMIT;
+        if (is_alike && other != (int)kind && implies(config, group, (taper_row_kind_t)other, kind)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+bool taper_row_is_planned(const taper_station_config_t *config, uint8_t group, taper_row_kind_t kind) {
+    return taper_row_limit(config, group, kind) != TAPER_NO_LIMIT && has_members(config, group, kind) &&
+           (kind >= TAPER_ROW_SUMS || !is_implied(config, group, kind));
 }

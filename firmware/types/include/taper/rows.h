@@ -74,7 +74,11 @@ uint8_t taper_rotation_phases(taper_rotation_t rotation, uint8_t conductors);
 /** Whether connector `i` is in this row of the planner: below `group`, with a weight by its description. Cost: O(depth). */
 bool taper_row_plans(const taper_station_config_t *config, uint8_t group, taper_row_kind_t kind, uint8_t i);
 
-/** Whether the planner has this row: it is limited, and some connector is in it. Cost: O(connectors x depth). */
+/**
+ * Whether the planner has this row: it is limited, some connector below `group` has a weight in it by its description, and,
+ * but for the site, no other line of the group weighs at least as much for each of them. Rows that say nothing new make the
+ * solver slow. Cost: O(connectors x (depth + kinds)).
+ */
 bool taper_row_is_planned(const taper_station_config_t *config, uint8_t group, taper_row_kind_t kind);
 
 /** Whether connector `i` hangs below group `k` of the feeder tree. Cost: O(depth). */
