@@ -171,7 +171,7 @@ static void test_row_41_vehicles_that_take_their_5_s_have_made_room_by_then(void
 }
 
 /** A limit of 0 from 80 s to 110 s; vehicle 1 is unplugged after 170 s. */
-static void start_with_a_pause(const sim_limits_t *limits) {
+static void start_with_a_pause(const sim_course_t *limits) {
     live_options_t options = live_options(-1.0);
     options.limits = limits;
     options.as_described = true;
@@ -185,7 +185,7 @@ static void start_with_a_pause(const sim_limits_t *limits) {
 
 static double pause_time_s[] = {0.0, LIVE_START_S + 80.0, LIVE_START_S + 110.0};
 static double pause_limit_kw[] = {LIMIT_KW, 0.0, LIMIT_KW};
-static const sim_limits_t pause_limits = {.time_s = pause_time_s, .limit_kw = pause_limit_kw, .count = 3};
+static const sim_course_t pause_limits = {.time_s = pause_time_s, .value = pause_limit_kw, .count = 3};
 
 static void test_row_42_who_ignores_a_pause_is_opened_and_locked_out_until_it_is_unplugged(void) {
     start_with_a_pause(&pause_limits);

@@ -14,7 +14,7 @@
 
 static double time_s[32];
 static double limit_kw[32];
-static sim_limits_t limits;
+static sim_course_t limits;
 
 static void add_limit(double after_s, double kw) {
     time_s[limits.count] = LIVE_START_S + after_s;
@@ -23,7 +23,7 @@ static void add_limit(double after_s, double kw) {
 }
 
 void setUp(void) {
-    limits = (sim_limits_t){.time_s = time_s, .limit_kw = limit_kw, .count = 0};
+    limits = (sim_course_t){.time_s = time_s, .value = limit_kw, .count = 0};
     add_limit(-1000.0, HIGH_KW);
 }
 
