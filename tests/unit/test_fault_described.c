@@ -67,6 +67,7 @@ static void test_row_12_fallback_currents_go_to_others_when_a_vehicle_leaves(voi
     for (uint8_t node = 1; node <= 4; node++) {
         had_one = fault_setpoint(node).fallback_mA > 0 ? node : had_one;
     }
+    TEST_ASSERT_GREATER_THAN_UINT(0, had_one);
     live.session[had_one - 1].departure_s = sim_field_world_s(&live.field); /* now */
     for (unsigned k = 0; k < 1000; k++) {
         live_bench_run_ms(LIVE_POLL_ms);

@@ -1,4 +1,5 @@
-/* A planner that fails, a guard that objects, a tick that is late, a bit that flips: faults 22 to 25, 47 and 48. */
+/* A planner that fails, a guard that objects, a tick that is late, a bit that flips: faults 22 to 25, 47 and 48. And what
+   vehicles ask of the planner that cannot be: 32 and 34. */
 #include <math.h>
 
 #include "solver.h"
@@ -185,6 +186,74 @@ static void test_row_25_where_scaling_does_not_help_everybody_gets_nothing(void)
     TEST_ASSERT_EQUAL_INT32(0, sum_mA());
 }
 
+/** Vehicle 1 tells something else of itself, with a revision of its own. */
+static void send_other_params(int32_t capacity_Wh, int32_t departure_min) {
+    taper_message_t message = {.kind = TAPER_MESSAGE_EV_PARAM_A, .node = 1};
+    message.as.ev_param_a = (taper_ev_param_a_t){.revision = 9,
+                                                 .session = 7,
+                                                 .capacity_Wh = capacity_Wh,
+                                                 .soc_target_permille = 800,
+                                                 .soc_minimum_permille = TAPER_ABSENT,
+                                                 .soc_plug_in_permille = 500};
+    bench_send(&message);
+    message = (taper_message_t){.kind = TAPER_MESSAGE_EV_PARAM_B, .node = 1};
+    message.as.ev_param_b = (taper_ev_param_b_t){
+        .revision = 9, .session = 7, .departure_min = departure_min, .peak_W = 11000, .min_mA = TAPER_ABSENT};
+    bench_send(&message);
+    message = (taper_message_t){.kind = TAPER_MESSAGE_EV_PARAM_C, .node = 1};
+    message.as.ev_param_c = (taper_ev_param_c_t){
+        .revision = 9, .target_Wh = 20000, .maximum_Wh = TAPER_ABSENT, .minimum_Wh = TAPER_ABSENT};
+    bench_send(&message);
+}
+
+/** A tick with the first `vehicles`, of which only vehicle 1 says anything. */
+static void tick_with_other_params(uint8_t vehicles, int32_t capacity_Wh, int32_t departure_min) {
+    bench_send_clock();
+    bench_send_limit(limit_W);
+    for (uint8_t node = 1; node <= VEHICLES; node++) {
+        bench_send_status(node, node <= vehicles);
+    }
+    send_other_params(capacity_Wh, departure_min);
+    bench_step();
+}
+
+static void assert_planned(void) {
+    TEST_ASSERT_EQUAL(TAPER_VERDICT_SOLVED, bench.station.planner.verdict);
+    TEST_ASSERT_EQUAL(TAPER_MODE_PLAN, taper_station_mode(&bench.station));
+    TEST_ASSERT_EQUAL_UINT32(0, count(TAPER_COUNTER_PLANS_REJECTED));
+}
+
+static void test_row_32_a_departure_in_the_past_makes_no_problem_infeasible_and_comes_first(void) {
+    const uint32_t plans = count(TAPER_COUNTER_PLANS);
+    for (int k = 0; k < 3; k++) {
+        limit_W = LOW_W;                              /* three could take 27 kW */
+        tick_with_other_params(3, 60000, 10000 - 60); /* an hour ago */
+    }
+    assert_planned();
+    TEST_ASSERT_GREATER_THAN_UINT32(plans, count(TAPER_COUNTER_PLANS));
+    TEST_ASSERT_LESS_THAN_INT32(0, bench.station.snapshot.demand[0].departs_in_s);
+    TEST_ASSERT_TRUE(taper_station_outlook(&bench.station, 0).departure_passed);
+    TEST_ASSERT_EQUAL_INT32(15900, bench.station.target.current_mA[0]); /* 11 kW, all that it takes */
+    TEST_ASSERT_LESS_THAN_INT32(11000, bench.station.target.current_mA[1]);
+    TEST_ASSERT_LESS_THAN_INT32(11000, bench.station.target.current_mA[2]);
+}
+
+static void test_row_34_a_vehicle_without_a_capacity_is_planned_by_its_energy(void) {
+    static const int32_t capacities_Wh[] = {TAPER_ABSENT, 100, 900, 2000100, 6553400};
+    for (unsigned k = 0; k < sizeof capacities_Wh / sizeof capacities_Wh[0]; k++) {
+        tick();
+        for (int s = 0; s < 3; s++) {
+            tick_with_other_params(VEHICLES, capacities_Wh[k], 10120);
+        }
+        assert_planned();
+        TEST_ASSERT_EQUAL_INT32(0, bench.station.snapshot.demand[0].capacity_Wh);
+        TEST_ASSERT_EQUAL_INT32(20000, bench.station.snapshot.demand[0].need_Wh);
+        TEST_ASSERT_TRUE(taper_station_outlook(&bench.station, 0).by_energy);
+        TEST_ASSERT_GREATER_OR_EQUAL_INT32(6000, bench.station.target.current_mA[0]);
+        TEST_ASSERT_GREATER_THAN_INT32(20000, sum_mA());
+    }
+}
+
 static void test_row_47_after_a_late_tick_edf_charges_for_one_tick(void) {
     tick();
     bench.now_ms += 600;
@@ -263,6 +332,8 @@ int main(void) {
     RUN_TEST(test_row_24_a_good_plan_between_two_bad_ones_keeps_the_planner_on);
     RUN_TEST(test_row_25_what_the_guard_refuses_is_scaled_down_and_counted);
     RUN_TEST(test_row_25_where_scaling_does_not_help_everybody_gets_nothing);
+    RUN_TEST(test_row_32_a_departure_in_the_past_makes_no_problem_infeasible_and_comes_first);
+    RUN_TEST(test_row_34_a_vehicle_without_a_capacity_is_planned_by_its_energy);
     RUN_TEST(test_row_47_after_a_late_tick_edf_charges_for_one_tick);
     RUN_TEST(test_row_47_after_two_late_ticks_in_a_row_the_watchdog_is_left_to_bite);
     RUN_TEST(test_row_48_a_flipped_setpoint_is_worked_out_again_before_it_is_sent);

@@ -318,8 +318,9 @@ static void test_rows_are_planned_where_a_limit_meets_a_connector(void) {
     TEST_ASSERT_TRUE(taper_row_is_planned(&station, 0, TAPER_ROW_L1_B));
     TEST_ASSERT_FALSE(taper_row_is_planned(&station, 0, TAPER_ROW_DELTA_L1)); /* no limit */
     TEST_ASSERT_FALSE(taper_row_is_planned(&station, 1, TAPER_ROW_POWER));
-    TEST_ASSERT_TRUE(taper_row_is_planned(&station, 1, TAPER_ROW_DELTA_L1));   /* by AB */
-    TEST_ASSERT_TRUE(taper_row_is_planned(&station, 1, TAPER_ROW_DELTA_L1_B)); /* by BC */
+    TEST_ASSERT_TRUE(taper_row_is_planned(&station, 1, TAPER_ROW_DELTA_L2));   /* AB twice, and BC */
+    TEST_ASSERT_TRUE(taper_row_is_planned(&station, 1, TAPER_ROW_DELTA_L3_B)); /* BC twice, and AB */
+    TEST_ASSERT_FALSE(taper_row_is_planned(&station, 1, TAPER_ROW_DELTA_L1));  /* AB once: by L2 */
     TEST_ASSERT_TRUE(taper_row_is_planned(&station, 1, TAPER_ROW_L1_L2));
     TEST_ASSERT_FALSE(taper_row_is_planned(&station, 2, TAPER_ROW_L1)); /* nobody there is on it */
     TEST_ASSERT_TRUE(taper_row_is_planned(&station, 2, TAPER_ROW_L3));
@@ -330,14 +331,14 @@ static void test_of_lines_of_a_feeder_that_carry_the_same_one_is_planned(void) {
         {.voltage_mV = 230000, .phases = 3, .rotation = TAPER_ROTATION_231, .group = 1},
         {.voltage_mV = 230000, .phases = 1, .rotation = TAPER_ROTATION_231, .group = 1},
     };
-    static const taper_group_config_t groups[] = {
+    static const taper_group_config_t tree[] = {
         {.limit_W = 69000, .limit_mA = 100000, .parent = TAPER_NO_GROUP},
         {.limit_W = 69000, .limit_mA = 100000, .imbalance_mA = 20000, .parent = 0},
     };
     taper_station_config_t feeder = station;
     feeder.connectors = sockets;
     feeder.connector_count = 2;
-    feeder.groups = groups;
+    feeder.groups = tree;
     feeder.group_count = 2;
     feeder.line_to_line = false;
     TEST_ASSERT_TRUE(taper_row_is_planned(&feeder, 1, TAPER_ROW_POWER));
