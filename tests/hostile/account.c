@@ -59,6 +59,7 @@ void account_init(account_t *account, const taper_station_config_t *config, int6
     memset(account, 0, sizeof *account);
     account->config = config;
     account->now_ms = now_ms;
+    account->ticked_ms = now_ms;
     for (unsigned rule = 0; rule < RULES; rule++) {
         account->verdict.margin[rule] = HUGE_VAL;
     }

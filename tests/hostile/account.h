@@ -150,6 +150,7 @@ typedef struct {
     int64_t now_ms;
     book_t book[TAPER_MAX_CONNECTORS];
     supply_t supply;
+    int64_t ticked_ms;     /**< the last control tick of the station */
     bool watches_physical; /**< the bus is good enough for over-draw to be seen in time */
     int64_t over_since_ms[TAPER_MAX_GROUPS + 1][4];
     bool is_over[TAPER_MAX_GROUPS + 1][4];

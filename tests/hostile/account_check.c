@@ -190,6 +190,7 @@ static unsigned conductors_told(const account_t *account, unsigned connector) {
 
 void account_tick(account_t *account, bool all_taken) {
     loads_t sent;
+    account->ticked_ms = account->now_ms;
     memset(&sent, 0, sizeof sent);
     for (unsigned i = 0; i < account->config->connector_count; i++) {
         account->book[i].tick_conductors = account->book[i].told_conductors;

@@ -10,7 +10,7 @@
 #define ONLY_BEATS_ms    120000
 /* A control tick notes that a limit ran out. */
 #define NOTED_ms 1000
-/* What the store has may be so old: it is written every 10 s at most, in a control tick. */
+/* What the store has may be so old when a station dies: it is written every 10 s at most, in a control tick. */
 #define STORED_ms 12000
 
 static void note(history_t *history, int64_t now_ms, double value) {
@@ -46,7 +46,8 @@ void account_supply_init(account_t *account) {
 
 void account_supply_restart(account_t *account) {
     supply_t *supply = &account->supply;
-    const double stored_W = account_most(account, &supply->failsafe_history_W, STORED_ms);
+    const double stored_W =
+        account_most(account, &supply->failsafe_history_W, account->now_ms - account->ticked_ms + STORED_ms);
     supply->failsafe_W = fmax(stored_W, supply->failsafe_W);
     supply->started_ms = account->now_ms;
     supply->heard = false;

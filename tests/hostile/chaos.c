@@ -149,6 +149,20 @@ static void set_curve(world_t *world) {
     }
 }
 
+/** A course of the price: it may change who is charged when, and no limit. */
+static void set_price(world_t *world) {
+    random_t *random = &world->random;
+    taper_price_curve_t price = {.count = (uint16_t)random_below(random, 9)};
+    uint32_t time_ms = (uint32_t)world->now_ms - (uint32_t)random_below(random, 100000);
+    for (unsigned k = 0; k < price.count; k++) {
+        price.point[k].time_ms = time_ms;
+        price.point[k].milli_per_kWh =
+            random_once_in(random, 20) ? (int32_t)random_bits(random) : random_in(random, -500, 1000);
+        time_ms += (uint32_t)random_in(random, random_once_in(random, 40) ? -1000 : 1, 900000);
+    }
+    world->injuries.curves += taper_station_set_price_curve(&world->station, &price) == TAPER_OK ? 1u : 0u;
+}
+
 static void no_curve(world_t *world) {
     const taper_limit_curve_t none = {.count = 0};
     (void)taper_station_set_limit_curve(&world->station, &none);
@@ -281,6 +295,7 @@ void chaos_tick(world_t *world) {
     }
     if (!world->station_dead && world->era != ERA_FAIR && random_once_in(&world->random, 300)) {
         set_curve(world);
+        set_price(world);
     }
     world->account.watches_physical = world->era == ERA_CALM;
     if (world->era == ERA_FAIR) {
