@@ -67,7 +67,10 @@ void taper_ledger_grant_fallback(const taper_ledger_t *ledger, const taper_stati
     int64_t room_mW = failsafe_mW;
     for (uint8_t i = 0; i < config->connector_count; i++) {
         fallback->current_mA[i] = 0;
+        /* Who accepted nothing since keeps it, whatever he is told now. */
+        budget_mW -= (int64_t)weight_W_per_A(&choice, i) * ledger->entry[i].over_fallback_mA;
     }
+    budget_mW = budget_mW < 0 ? 0 : budget_mW;
     for (uint8_t place = 0; place < config->connector_count; place++) {
         /* A rank binds nobody: it may name a connector twice, or one that there is not. */
         if (rank[place] < config->connector_count && fallback->current_mA[rank[place]] == 0) {
