@@ -3,6 +3,8 @@
 
 /** 100 kA [0.1 mA]: beyond it squares do not fit 64 bits. No limit is taken to be as great. */
 #define MOST_uA100 INT64_C(1000000000)
+/** sqrt(3) - 1, rounded up [permille]. */
+#define FACET_permille 733
 
 /** What flows into a group. */
 typedef struct {
@@ -104,6 +106,14 @@ static bool line_passes(const load_t *load, unsigned line, int32_t limit_mA) {
     return fits(x * x + x * y + y * y, load->line_uA[line], limit_mA);
 }
 
+/** Two windings that lead to neutral carry x and y, which differ by 60 degrees: at most max(x, y) + (sqrt(3) - 1) min(x, y), as in
+    the rows (taper/rows.h), and exact for three phases alike. */
+static int64_t windings_uA(const load_t *load, unsigned line) {
+    const int64_t x = load->line_uA[line];
+    const int64_t y = load->line_uA[(line + 2) % 3];
+    return x > y ? x + quotient_up(y * FACET_permille, 1000) : y + quotient_up(x * FACET_permille, 1000);
+}
+
 /**
  * Line a of a delta side carries AB + BC - 2 CA: |I|^2 = (AB^2 - AB BC + BC^2) + 2 CA (AB + BC) + 4 CA^2, and the windings a
  * and c, that is what flows from the lines a and c to neutral.
@@ -113,7 +123,7 @@ static bool delta_passes(const load_t *load, unsigned line, int32_t limit_mA) {
     const int64_t bc = pair_uA100(load, line + 1);
     const int64_t ca = pair_uA100(load, line + 2);
     const int64_t square = ab * ab - ab * bc + bc * bc + 2 * ca * (ab + bc) + 4 * ca * ca;
-    return fits(square, load->line_uA[line] + load->line_uA[(line + 2) % 3], limit_mA);
+    return fits(square, windings_uA(load, line), limit_mA);
 }
 
 /** Current on a line as it counts for imbalance: pairs count on both of their lines. */

@@ -6,6 +6,8 @@
 #include "taper/ledger.h"
 
 #define LINES 3u
+/** sqrt(3) - 1, rounded up [permille]. */
+#define FACET_permille 733
 
 /** What connectors below a group draw: power, current to neutral by line, and between lines L1-L2, L2-L3, L3-L1. */
 typedef struct {
@@ -116,13 +118,19 @@ static int64_t line_uA(const load_t *load, unsigned line) {
     return load->line_uA[line] + 1000 * root(x_mA * x_mA + x_mA * y_mA + y_mA * y_mA);
 }
 
+/** What two windings to neutral carry, 60 degrees apart: exact for three phases alike, as the rows have it. */
+static int64_t windings_uA(int64_t x_uA, int64_t y_uA) {
+    const int64_t less_uA = x_uA < y_uA ? x_uA : y_uA;
+    return x_uA + y_uA - less_uA + (less_uA * FACET_permille + 999) / 1000;
+}
+
 /** Current of a line on the delta side, times the ratio of windings: pairs add up to AB + BC - 2 CA, 120 degrees apart. */
 static int64_t delta_uA(const load_t *load, unsigned line) {
     const int64_t a_mA = whole_mA(load->pair_uA[line]);
     const int64_t b_mA = whole_mA(load->pair_uA[(line + 1u) % LINES]);
     const int64_t c_mA = whole_mA(2 * load->pair_uA[(line + 2u) % LINES]);
     const int64_t square = a_mA * a_mA + b_mA * b_mA + c_mA * c_mA - a_mA * b_mA + a_mA * c_mA + b_mA * c_mA;
-    return load->line_uA[line] + load->line_uA[(line + 2u) % LINES] + 1000 * root(square);
+    return windings_uA(load->line_uA[line], load->line_uA[(line + 2u) % LINES]) + 1000 * root(square);
 }
 
 /** Whether what was `before` and is `after` now, in thousandths, may be: within the limit, or no more. */
