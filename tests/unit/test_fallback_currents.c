@@ -333,6 +333,28 @@ static void test_whatever_happens_the_sum_is_within_a_constant_limit(void) {
     TEST_ASSERT_GREATER_THAN_UINT64(UINT64_C(100000) * 5000, told_mA); /* and not by telling nothing */
 }
 
+static void test_when_the_failsafe_limit_falls_who_can_be_reached_gives_up_for_who_cannot(void) {
+    choose(W_of_dA(340));
+    send_and_echo_all();
+    now_ms += EXPIRED_ms;
+    taper_ledger_update(&ledger, now_ms);
+    for (uint8_t i = 0; i < 3; i++) { /* the last one hears nothing, and keeps 6 A */
+        send(i);
+        echo(i);
+    }
+    choose(W_of_dA(160));
+    assert_chosen(10000, 0, 0, 6000);
+}
+
+static void test_those_who_cannot_be_reached_are_told_no_more_than_fits_for_when_they_can(void) {
+    choose(W_of_dA(340));
+    send_and_echo_all();
+    now_ms += EXPIRED_ms;
+    taper_ledger_update(&ledger, now_ms);
+    choose(W_of_dA(160));
+    assert_chosen(10000, 6000, 0, 0);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_with_room_for_all_everybody_has_the_configured_one);
@@ -354,5 +376,7 @@ int main(void) {
     RUN_TEST(test_the_guard_refuses_what_is_above_its_setpoint_or_below_nothing);
     RUN_TEST(test_the_guard_refuses_a_sum_above_the_limit_unless_it_was_as_high_before);
     RUN_TEST(test_whatever_happens_the_sum_is_within_a_constant_limit);
+    RUN_TEST(test_when_the_failsafe_limit_falls_who_can_be_reached_gives_up_for_who_cannot);
+    RUN_TEST(test_those_who_cannot_be_reached_are_told_no_more_than_fits_for_when_they_can);
     return UNITY_END();
 }

@@ -310,14 +310,20 @@ static void test_on_the_delta_side_pairs_add_as_phasors(void) {
     }
 }
 
+static void test_on_the_delta_side_three_phases_alike_count_as_in_the_rows(void) {
+    connectors[0].phases = 3;
+    groups[1].delta_mA = 17330; /* sqrt(3) x 10 A, rounded up */
+    assert_bound(0, 10000);
+}
+
 static void test_on_the_delta_side_a_phase_loads_the_two_lines_of_its_winding(void) {
     groups[1].delta_mA = 16000;
     grant(0, 10000);
     connectors[1].rotation = TAPER_ROTATION_231;
-    assert_bound(1, 6000); /* meets it in one line */
+    assert_bound(1, 8185); /* meets it in one line, 60 degrees apart */
     grant(1, 0);
     connectors[0].phases = 3;
-    assert_bound(0, 8000);
+    assert_bound(0, 9232);
 }
 
 static void test_what_may_be_drawn_already_may_stay_and_not_grow(void) {
@@ -443,6 +449,7 @@ int main(void) {
     RUN_TEST(test_pairs_that_were_told_count_as_pairs);
     RUN_TEST(test_on_the_delta_side_one_pair_counts_twice_in_the_line_across);
     RUN_TEST(test_on_the_delta_side_pairs_add_as_phasors);
+    RUN_TEST(test_on_the_delta_side_three_phases_alike_count_as_in_the_rows);
     RUN_TEST(test_on_the_delta_side_a_phase_loads_the_two_lines_of_its_winding);
     RUN_TEST(test_what_may_be_drawn_already_may_stay_and_not_grow);
     RUN_TEST(test_decreases_count_when_they_are_proven);

@@ -2,6 +2,8 @@
 #include "taper/allocator.h"
 
 #define LINES 3u
+/** sqrt(3) - 1, rounded up [permille]. */
+#define FACET_permille 733
 
 /** 100 kA [0.1 mA]: beyond it squares do not fit 64 bits. No limit is taken to be as great. */
 #define MOST_uA100 INT64_C(1000000000)
@@ -10,7 +12,6 @@
 typedef struct {
     int64_t power_mW;
     int64_t line_uA[LINES]; /* to neutral, or of three phases, or of a wiring that is not known: L1, L2, L3 */
-    int64_t three_uA;       /* of these, what flows in all three lines */
     int64_t pair_uA[LINES]; /* between two lines: L1-L2, L2-L3, L3-L1 */
 } load_t;
 
@@ -78,12 +79,10 @@ static void add_current(load_t *load, const taper_booking_t *booking, int32_t cu
     for (unsigned line = 0; line < LINES; line++) {
         load->line_uA[line] += (booking->phases >> line & 1u) != 0u ? current_uA : 0;
     }
-    load->three_uA += booking->phases == 7 ? current_uA : 0;
 }
 
 static void add_load(load_t *sum, const load_t *load) {
     sum->power_mW += load->power_mW;
-    sum->three_uA += load->three_uA;
     for (unsigned line = 0; line < LINES; line++) {
         sum->line_uA[line] += load->line_uA[line];
         sum->pair_uA[line] += load->pair_uA[line];
@@ -110,18 +109,22 @@ static bool line_passes(const load_t *load, unsigned line, int32_t limit_mA) {
     return fits(x * x + x * y + y * y, load->line_uA[line], limit_mA);
 }
 
+/** What two windings to neutral carry, 60 degrees apart: exact for one alone, and for three phases alike. */
+static int64_t windings_uA(int64_t x_uA, int64_t y_uA) {
+    const int64_t less_uA = x_uA < y_uA ? x_uA : y_uA;
+    return x_uA + y_uA - less_uA + quotient_up(less_uA * FACET_permille, 1000);
+}
+
 /**
  * Line a of a delta side carries AB + BC - 2 CA: |I|^2 = (AB^2 - AB BC + BC^2) + 2 CA (AB + BC) + 4 CA^2, and the windings a
- * and c, that is what flows from the lines a and c to neutral; of what flows in all three lines sqrt(3) times one of them.
+ * and c, that is what flows from the lines a and c to neutral.
  */
 static bool delta_passes(const load_t *load, unsigned line, int32_t limit_mA) {
     const int64_t ab = pair_uA100(load, line);
     const int64_t bc = pair_uA100(load, line + 1);
     const int64_t ca = pair_uA100(load, line + 2);
     const int64_t square = ab * ab - ab * bc + bc * bc + 2 * ca * (ab + bc) + 4 * ca * ca;
-    const int64_t windings_uA = load->line_uA[line] + load->line_uA[(line + 2) % LINES];
-    const int64_t apart_uA = load->three_uA * 26794 / 100000; /* 2 - sqrt(3), rounded down */
-    return fits(square, windings_uA - apart_uA, limit_mA);
+    return fits(square, windings_uA(load->line_uA[line], load->line_uA[(line + 2) % LINES]), limit_mA);
 }
 
 /** Current on a line as it counts for imbalance: pairs count on both of their lines. */

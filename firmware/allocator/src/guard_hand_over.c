@@ -6,12 +6,13 @@
 #include "taper/ledger.h"
 
 #define LINES 3u
+/** sqrt(3) - 1, rounded up [permille]. */
+#define FACET_permille 733
 
 /** What connectors below a group draw: power, current to neutral by line, and between lines L1-L2, L2-L3, L3-L1. */
 typedef struct {
     int64_t power_mW;
     int64_t line_uA[LINES];
-    int64_t three_uA; /* of these, what flows in all three lines */
     int64_t pair_uA[LINES];
 } load_t;
 
@@ -62,7 +63,6 @@ static void add_current(load_t *load, unsigned lines, bool between_lines, int64_
     for (unsigned line = 0; line < LINES; line++) {
         load->line_uA[line] += (lines >> line & 1u) != 0 ? current_uA : 0;
     }
-    load->three_uA += lines == 7u ? current_uA : 0;
 }
 
 static void add_connector(const taper_station_config_t *config, const taper_demand_t *demand, uint8_t i,
@@ -90,7 +90,6 @@ static void add_up(const taper_station_config_t *config, const taper_snapshot_t 
     for (uint8_t k = config->group_count; k-- > 1;) { /* children stand behind their parents */
         load_t *parent = &load[config->groups[k].parent];
         parent->power_mW += load[k].power_mW;
-        parent->three_uA += load[k].three_uA;
         for (unsigned line = 0; line < LINES; line++) {
             parent->line_uA[line] += load[k].line_uA[line];
             parent->pair_uA[line] += load[k].pair_uA[line];
@@ -119,15 +118,19 @@ static int64_t line_uA(const load_t *load, unsigned line) {
     return load->line_uA[line] + 1000 * root(x_mA * x_mA + x_mA * y_mA + y_mA * y_mA);
 }
 
-/** Current of a line on the delta side, times the ratio of windings: pairs add up to AB + BC - 2 CA, 120 degrees apart; to
-    neutral two windings do, and what flows in all three lines is sqrt(3) of one. */
+/** What two windings to neutral carry, 60 degrees apart: exact for one alone, and for three phases alike. */
+static int64_t windings_uA(int64_t x_uA, int64_t y_uA) {
+    const int64_t less_uA = x_uA < y_uA ? x_uA : y_uA;
+    return x_uA + y_uA - less_uA + (less_uA * FACET_permille + 999) / 1000;
+}
+
+/** Current of a line on the delta side, times the ratio of windings: pairs add up to AB + BC - 2 CA, 120 degrees apart. */
 static int64_t delta_uA(const load_t *load, unsigned line) {
     const int64_t a_mA = whole_mA(load->pair_uA[line]);
     const int64_t b_mA = whole_mA(load->pair_uA[(line + 1u) % LINES]);
     const int64_t c_mA = whole_mA(2 * load->pair_uA[(line + 2u) % LINES]);
     const int64_t square = a_mA * a_mA + b_mA * b_mA + c_mA * c_mA - a_mA * b_mA + a_mA * c_mA + b_mA * c_mA;
-    const int64_t windings_uA = load->line_uA[line] + load->line_uA[(line + 2u) % LINES];
-    return windings_uA - load->three_uA * 26794 / 100000 + 1000 * root(square);
+    return windings_uA(load->line_uA[line], load->line_uA[(line + 2u) % LINES]) + 1000 * root(square);
 }
 
 /** Whether what was `before` and is `after` now, in thousandths, may be: within the limit, or no more. */
