@@ -302,13 +302,13 @@ static void test_what_flows_to_neutral_is_in_two_lines_of_a_delta_side(void) {
         assert_just_enough(&tree.group[0].delta_mA, 10000);
         tree_add(&tree, 0, lines[(k + 1) % 3]); /* they share a winding's line */
         give(1, 8000);
-        assert_just_enough(&tree.group[0].delta_mA, 18000);
+        assert_just_enough(&tree.group[0].delta_mA, 15864); /* 10 A and 0.733 times 8 A */
     }
     tree_init(&tree);
     memset(&tree.setpoints, 0, sizeof tree.setpoints);
     tree_add(&tree, 0, L1 | L2 | L3);
     give(0, 10000);
-    assert_just_enough(&tree.group[0].delta_mA, 20000);
+    assert_just_enough(&tree.group[0].delta_mA, 17330); /* sqrt(3) of a phase */
 }
 
 static void test_phases_differ_by_no_more_than_the_imbalance(void) {

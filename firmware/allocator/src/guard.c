@@ -44,15 +44,24 @@ static uint8_t lines_of(const taper_connector_config_t *connector) {
     return connector->phases == 1 ? first[rotation] : 7;
 }
 
+/** Power of 1 A in the supply: as booked, but no less than the vehicle draws, with a converter's losses. */
+static int32_t W_per_A_of(const taper_connector_config_t *connector, const taper_demand_t *demand) {
+    const int32_t efficiency = connector->is_dc ? connector->efficiency_permille : 1000;
+    const int64_t drawn_W_per_A = quotient_up((int64_t)demand->W_per_A * 1000, efficiency);
+    return taper_max_i32((int32_t)drawn_W_per_A, demand->booking.W_per_A);
+}
+
 /** How a connector draws, by the snapshot, or else by its description. */
 static taper_booking_t booking_of(const taper_station_config_t *config, const taper_demand_t *demand,
                                   uint8_t i) {
     const taper_connector_config_t *connector = &config->connectors[i];
+    taper_booking_t booking = demand->booking;
     if (demand->booking.phases != 0) {
-        return demand->booking;
+        booking.W_per_A = W_per_A_of(connector, demand);
+        return booking;
     }
-    taper_booking_t booking = {
-        .W_per_A = taper_max_i32(demand->W_per_A, demand->booking.W_per_A),
+    booking = (taper_booking_t){
+        .W_per_A = W_per_A_of(connector, demand),
         .permille = 1000,
         .phases = lines_of(connector),
         .line_to_line = connector->line_to_line,

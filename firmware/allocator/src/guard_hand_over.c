@@ -17,18 +17,17 @@ typedef struct {
 } load_t;
 
 static int32_t power_W_per_A(const taper_connector_config_t *connector, const taper_demand_t *demand) {
-    int32_t W_per_A = demand->W_per_A;
-    if (demand->booking.phases != 0) {
-        return demand->booking.W_per_A;
+    const int32_t booked_W_per_A = demand->booking.W_per_A;
+    if (!demand->active && demand->booking.phases != 0 && booked_W_per_A != 0) {
+        return booked_W_per_A;
     }
-    if (!demand->active) {
-        W_per_A = (connector->voltage_mV + 999) / 1000 * connector->phases;
-        if (connector->is_dc) {
-            const int32_t efficiency = connector->efficiency_permille;
-            W_per_A = (W_per_A * 1000 + efficiency - 1) / efficiency;
-        }
+    int32_t W_per_A =
+        demand->active ? demand->W_per_A : (connector->voltage_mV + 999) / 1000 * connector->phases;
+    if (connector->is_dc) {
+        const int32_t efficiency = connector->efficiency_permille;
+        W_per_A = (W_per_A * 1000 + efficiency - 1) / efficiency;
     }
-    return W_per_A > demand->booking.W_per_A ? W_per_A : demand->booking.W_per_A;
+    return W_per_A > booked_W_per_A ? W_per_A : booked_W_per_A;
 }
 
 /** Lines that a connector is wired to by its description: bit 0 L1 .. bit 2 L3. */
