@@ -3,20 +3,21 @@
 OSQP is generated for this structure; the firmware writes the values at run time. The values here are realistic ones,
 so that the generated solver is a valid one for some station with every slot in use.
 
-N connectors, T steps, K groups. Variable v(i,t) = i*T + t: energy that connector i has got by the end of step t.
-Rows, with v(i,-1) = 0:
+N connectors, T steps, R rows of limits (rows.py). Variable v(i,t) = i*T + t: energy that connector i has got by the end
+of step t. Rows, with v(i,-1) = 0:
 
     rate    i*T + t                      v(i,t) - v(i,t-1)
     taper   N*T + i*(T-1) + (t-1)        v(i,t) - (1 - a_i) v(i,t-1), t >= 1
     target  N*T + N*(T-1) + i            0.58 v(i,T-1)
-    sum     N*T + N*(T-1) + N + k*T + t  s_k * sum of v(i,t) - v(i,t-1) over the n_k connectors in and below group k
+    sum     N*T + N*(T-1) + N + r*T + t  s_r * sum of c_ri (v(i,t) - v(i,t-1)) over the n_r connectors in row r
 
-with s_k = sqrt(5 / n_k). The factors 0.58 and s_k make the rows alike in size, which OSQP's convergence depends on.
+with s_r = sqrt(5 / n_r). c_ri is what the row counts per power of the connector: supply power, or current times the site's
+voltage. The factors 0.58 and s_r make the rows alike in size, which OSQP's convergence depends on.
 
 In the compressed columns the entries stand by ascending row. Column v(i,t) of A is therefore
 
     1 (rate t), -1 (rate t+1), 1 (taper t), -(1-a_i) (taper t+1), 0.58 (target),
-    then for each group of i, site first: s_k (sum t), -s_k (sum t+1)
+    then for each row r that i is in, ascending: s_r c_ri (sum t), -s_r c_ri (sum t+1)
 
 where "t" of the taper is there only for t >= 1, all of "t+1" only for t < T-1 and the target only for t = T-1.
 Column v(i,t) of P (upper triangle) is the entry with v(i,t-1), for t >= 1, and then the diagonal.
@@ -28,10 +29,11 @@ from math import sqrt
 import numpy as np
 from scipy import sparse
 
+from rows import POWER, Row, planned_rows
 from station import Station
 
 TARGET_FACTOR = 0.58
-SUM_FACTOR_CONNECTORS = 5.0  # s_k is 1 for a group of this many
+SUM_FACTOR_CONNECTORS = 5.0  # s_r is 1 for a row of this many
 TAPER = 0.03  # a: fall of the power per energy, per unit
 POWER_COST = 0.1  # q
 DISCOUNT = 0.95  # g, per step
@@ -43,7 +45,7 @@ class Layout:
 
     connectors: int
     steps: int
-    groups: int
+    sums: int  # rows of limits in each step
 
     @property
     def variables(self) -> int:
@@ -51,7 +53,7 @@ class Layout:
 
     @property
     def rows(self) -> int:
-        return self.sum_row(self.groups, 0)
+        return self.sum_row(self.sums, 0)
 
     def variable(self, connector: int, step: int) -> int:
         return connector * self.steps + step
@@ -66,23 +68,23 @@ class Layout:
     def target_row(self, connector: int) -> int:
         return self.variables + self.connectors * (self.steps - 1) + connector
 
-    def sum_row(self, group: int, step: int) -> int:
-        return self.target_row(self.connectors) + group * self.steps + step
+    def sum_row(self, number: int, step: int) -> int:
+        return self.target_row(self.connectors) + number * self.steps + step
 
 
 def layout(station: Station) -> Layout:
-    return Layout(len(station.connectors), station.steps, len(station.groups))
+    return Layout(len(station.connectors), station.steps, len(planned_rows(station)))
 
 
 def constraint_matrix(station: Station) -> sparse.csc_matrix:
     """A, with sorted row indices."""
     at = layout(station)
-    scale = [sqrt(SUM_FACTOR_CONNECTORS / len(station.connectors_below(k))) for k in range(at.groups)]
+    limits = [sum_factors(station, row) for row in planned_rows(station)]
     entries: list[tuple[int, int, float]] = []
     for i in range(at.connectors):
-        groups = station.groups_of(i)
+        own = [(number, factors[i]) for number, factors in enumerate(limits) if i in factors]
         for t in range(at.steps):
-            differences = [(at.rate_row(i, t), 1.0)] + [(at.sum_row(k, t), scale[k]) for k in groups]
+            differences = [(at.rate_row(i, t), 1.0)] + [(at.sum_row(number, t), factor) for number, factor in own]
             for row, factor in differences:
                 entries.append((row, at.variable(i, t), factor))
                 if t > 0:
@@ -92,6 +94,19 @@ def constraint_matrix(station: Station) -> sparse.csc_matrix:
                 entries.append((at.taper_row(i, t), at.variable(i, t - 1), TAPER - 1.0))
         entries.append((at.target_row(i), at.variable(i, at.steps - 1), TARGET_FACTOR))
     return _csc(entries, (at.rows, at.variables))
+
+
+def sum_factors(station: Station, row: Row) -> dict[int, float]:
+    """s_r c_ri of the connectors in a row, all conductors in use."""
+    scale = sqrt(SUM_FACTOR_CONNECTORS / len(row.weights))
+    reference = 1.0 if row.kind == POWER else station.site_voltage_mV / 1000  # makes a row of currents one of powers
+    return {i: scale * (weight * reference / _drawn_W_per_A(station, i)) for i, weight in row.weights.items()}
+
+
+def _drawn_W_per_A(station: Station, i: int) -> float:
+    """Power of the vehicle for 1 A of setpoint: without the losses that count in the supply."""
+    connector = station.connectors[i]
+    return float(-(-connector.voltage_mV // 1000) * connector.phases)
 
 
 def cost_matrix(station: Station) -> sparse.csc_matrix:

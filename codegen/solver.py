@@ -147,7 +147,7 @@ const taper_solver_t taper_solver_{name} = {{
     .rows = {at.rows},
     .connectors = {at.connectors},
     .steps = {at.steps},
-    .groups = {at.groups},
+    .sums = {at.sums},
 }};
 """
 

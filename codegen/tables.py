@@ -1,5 +1,6 @@
 """Writes a station's description as C tables, and the sizes that the firmware's arrays have."""
 
+from rows import planned_rows
 from station import Connector, Group, Station
 
 
@@ -16,6 +17,8 @@ def sizes_header(stations: list[Station], real: str) -> str:
 #define TAPER_MAX_CONNECTORS {max(len(station.connectors) for station in stations)}
 #define TAPER_MAX_STEPS {max(station.steps for station in stations)}
 #define TAPER_MAX_GROUPS {max(len(station.groups) for station in stations)}
+/** Rows of a station's limits that the planner has (taper_row_is_planned), in every step. */
+#define TAPER_MAX_PLAN_ROWS {max(len(planned_rows(station)) for station in stations)}
 
 /** Floating-point type of battery, horizon and planner: 1 double, 0 float. */
 #define TAPER_REAL_IS_DOUBLE {int(real == "double")}

@@ -94,7 +94,7 @@ static void print_reals(const taper_real_t *values, unsigned count) {
 
 static void print_numbers(void) {
     const unsigned variables = (unsigned)config->connector_count * config->steps;
-    const unsigned rows = 2 * variables + (unsigned)config->group_count * config->steps;
+    const unsigned rows = 2 * variables + (unsigned)planner.horizon.sum_count * config->steps;
     print_reals(planner.horizon.linear, variables);
     print_reals(planner.horizon.lower, rows);
     print_reals(planner.horizon.upper, rows);

@@ -2,6 +2,7 @@
 
 #include <tgmath.h>
 
+#include "sums.h"
 #include "taper/battery.h"
 
 /** What one connector brings into the problem, per unit. */
@@ -30,14 +31,6 @@ taper_real_t taper_horizon_hessian_diagonal(uint8_t steps, uint8_t t) {
 
 taper_real_t taper_horizon_hessian_neighbour(uint8_t t) {
     return -TAPER_CURVATURE * discount_to((unsigned)t + 1);
-}
-
-taper_real_t taper_horizon_sum_scale(const taper_station_config_t *config, uint8_t k) {
-    uint8_t members = 0;
-    for (uint8_t i = 0; i < config->connector_count; i++) {
-        members = (uint8_t)(members + (taper_group_contains(config, k, i) ? 1 : 0));
-    }
-    return members > 0 ? (taper_real_t)sqrt((taper_real_t)5 / (taper_real_t)members) : 0;
 }
 
 static taper_real_t strongest_connector_W(const taper_station_config_t *config) {
@@ -144,31 +137,30 @@ static void write_connector(taper_horizon_t *horizon, uint8_t i, const taper_dem
         write_idle(horizon, i);
         return;
     }
-    const chain_t chain = chain_of(horizon, demand);
+    chain_t chain = chain_of(horizon, demand);
+    chain.rate = taper_real_min(chain.rate, taper_sums_most(horizon, i));
     write_chain(horizon, i, &chain, site_limit_W);
     horizon->upper[target] = chain.need * TAPER_TARGET_SCALE;
 }
 
-static void write_group(taper_horizon_t *horizon, uint8_t k, const int32_t *site_limit_W) {
-    const taper_station_config_t *config = horizon->config;
-    const taper_real_t scale = taper_horizon_sum_scale(config, k) / horizon->base_W;
-    const size_t first = taper_first_sum_row(config) + (size_t)k * config->steps;
-    for (uint8_t t = 0; t < config->steps; t++) {
-        const int32_t limit_W =
-            k == 0 ? taper_min_i32(site_limit_W[t], config->groups[0].limit_W) : config->groups[k].limit_W;
-        horizon->lower[first + t] = -TAPER_REAL_UNBOUNDED;
-        horizon->upper[first + t] = (taper_real_t)limit_W * scale;
+void taper_horizon_shape(taper_horizon_t *horizon, const taper_station_config_t *config) {
+    horizon->config = config;
+    horizon->base_W = strongest_connector_W(config);
+    taper_sums_list(horizon);
+    for (uint8_t i = 0; i < config->connector_count; i++) {
+        taper_sums_weigh(horizon, i, NULL);
+        horizon->taper_keep[i] = 1;
     }
 }
 
 void taper_horizon_build(taper_horizon_t *horizon, const taper_station_config_t *config,
                          const taper_snapshot_t *snapshot, const taper_course_t *course) {
-    horizon->config = config;
-    horizon->base_W = strongest_connector_W(config);
+    taper_horizon_shape(horizon, config);
+    taper_sums_bound(horizon, course);
     for (uint8_t i = 0; i < config->connector_count; i++) {
+        if (snapshot->demand[i].active) {
+            taper_sums_weigh(horizon, i, snapshot);
+        }
         write_connector(horizon, i, &snapshot->demand[i], course->limit_W);
-    }
-    for (uint8_t k = 0; k < config->group_count; k++) {
-        write_group(horizon, k, course->limit_W);
     }
 }

@@ -1,64 +1,80 @@
 #include "matrices.h"
 
-OSQPInt taper_write_hessian(const taper_solver_t *solver) {
-    OSQPInt at = 0;
+#include <string.h>
+
+/** Values being written one after the other. */
+typedef struct {
+    OSQPFloat *values;
+    OSQPInt room;
+    taper_written_t written;
+} writer_t;
+
+/** To the bit, so that a NaN that got in by accident counts as a change. */
+static void put(writer_t *writer, OSQPFloat value) {
+    const OSQPInt at = writer->written.count++;
+    if (at < writer->room && memcmp(&writer->values[at], &value, sizeof value) != 0) {
+        writer->values[at] = value;
+        writer->written.changed = true;
+    }
+}
+
+taper_written_t taper_write_hessian(const taper_solver_t *solver) {
+    writer_t writer = {.values = solver->p_values, .room = solver->p_count};
     for (uint8_t i = 0; i < solver->connectors; i++) {
         for (uint8_t t = 0; t < solver->steps; t++) {
             if (t > 0) {
-                solver->p_values[at++] = taper_horizon_hessian_neighbour(t);
+                put(&writer, taper_horizon_hessian_neighbour(t));
             }
-            solver->p_values[at++] = taper_horizon_hessian_diagonal(solver->steps, t);
+            put(&writer, taper_horizon_hessian_diagonal(solver->steps, t));
         }
     }
-    return at;
+    return writer.written;
 }
 
-/** Sum-row entries of one column: +scale in step t, -scale in step t+1, for each group above connector i. */
-static OSQPInt write_sums(OSQPFloat *values, OSQPInt at, uint8_t i, bool last_step,
-                          const taper_station_config_t *config, const taper_real_t *scale) {
-    for (uint8_t k = 0; k < config->group_count; k++) {
-        if (!taper_group_contains(config, k, i)) {
-            continue;
-        }
-        values[at++] = scale[k];
-        if (!last_step) {
-            values[at++] = -scale[k];
+/** Weights of the sums that connector i is in, ascending; a weight of 0 at present is one too. @return how many. */
+static uint16_t weights_of(taper_real_t *weights, const taper_horizon_t *horizon, uint8_t i) {
+    uint16_t count = 0;
+    for (uint16_t r = 0; r < horizon->sum_count; r++) {
+        const taper_sum_t *sum = &horizon->sum[r];
+        if (taper_row_plans(horizon->config, sum->group, (taper_row_kind_t)sum->kind, i)) {
+            weights[count++] = horizon->weight[r][i];
         }
     }
-    return at;
+    return count;
 }
 
-/** Column v(i,t). Its rows, ascending: rate t, rate t+1, taper t, taper t+1, target, sums. */
-static OSQPInt write_column(OSQPFloat *values, OSQPInt at, uint8_t t, uint8_t steps, taper_real_t keep) {
-    const bool last_step = t + 1 == steps;
-    values[at++] = 1;
+/** Column v(i,t) up to its sums. Its rows, ascending: rate t, rate t+1, taper t, taper t+1, target. */
+static void put_chain(writer_t *writer, uint8_t t, bool last_step, taper_real_t keep) {
+    put(writer, 1);
     if (!last_step) {
-        values[at++] = -1;
+        put(writer, -1);
     }
     if (t > 0) {
-        values[at++] = 1;
+        put(writer, 1);
     }
-    if (!last_step) {
-        values[at++] = -keep;
-    }
-    if (last_step) {
-        values[at++] = TAPER_TARGET_SCALE;
-    }
-    return at;
+    put(writer, last_step ? TAPER_TARGET_SCALE : -keep);
 }
 
-OSQPInt taper_write_constraints(const taper_solver_t *solver, const taper_station_config_t *config,
-                                const taper_real_t *taper_keep) {
-    taper_real_t scale[TAPER_MAX_GROUPS];
-    for (uint8_t k = 0; k < config->group_count; k++) {
-        scale[k] = taper_horizon_sum_scale(config, k);
-    }
-    OSQPInt at = 0;
-    for (uint8_t i = 0; i < solver->connectors; i++) {
-        for (uint8_t t = 0; t < solver->steps; t++) {
-            at = write_column(solver->a_values, at, t, solver->steps, taper_keep[i]);
-            at = write_sums(solver->a_values, at, i, t + 1 == solver->steps, config, scale);
+/** Sum rows of one column: the weight in step t, minus it in step t+1. */
+static void put_sums(writer_t *writer, bool last_step, const taper_real_t *weights, uint16_t count) {
+    for (uint16_t k = 0; k < count; k++) {
+        put(writer, weights[k]);
+        if (!last_step) {
+            put(writer, -weights[k]);
         }
     }
-    return at;
+}
+
+taper_written_t taper_write_constraints(const taper_solver_t *solver, const taper_horizon_t *horizon) {
+    writer_t writer = {.values = solver->a_values, .room = solver->a_count};
+    taper_real_t weights[TAPER_MAX_PLAN_ROWS];
+    for (uint8_t i = 0; i < solver->connectors; i++) {
+        const uint16_t count = weights_of(weights, horizon, i);
+        for (uint8_t t = 0; t < solver->steps; t++) {
+            const bool last_step = t + 1 == solver->steps;
+            put_chain(&writer, t, last_step, horizon->taper_keep[i]);
+            put_sums(&writer, last_step, weights, count);
+        }
+    }
+    return writer.written;
 }

@@ -4,11 +4,17 @@
 
 #include "solver.h"
 
-/** Write the Hessian's values. @return how many, to be compared with `solver->p_count`. */
-OSQPInt taper_write_hessian(const taper_solver_t *solver);
+/** What became of writing a matrix. */
+typedef struct {
+    OSQPInt
+        count; /**< values that it has, to be compared with `a_count` or `p_count`; none beyond these is written */
+    bool changed; /**< some value was not there already */
+} taper_written_t;
 
-/** Write the constraint matrix's values. @return how many, to be compared with `solver->a_count`. */
-OSQPInt taper_write_constraints(const taper_solver_t *solver, const taper_station_config_t *config,
-                                const taper_real_t *taper_keep);
+/** Write the Hessian's values. */
+taper_written_t taper_write_hessian(const taper_solver_t *solver);
+
+/** Write the constraint matrix's values for `horizon`: its tapers and the weights of its sums. */
+taper_written_t taper_write_constraints(const taper_solver_t *solver, const taper_horizon_t *horizon);
 
 #endif

@@ -5,7 +5,9 @@
 
 #include "matrices.h"
 #include "project.h"
+#include "residual.h"
 #include "solver.h"
+#include "warm_start.h"
 
 _Static_assert(sizeof(OSQPFloat) == sizeof(taper_real_t),
                "solver and firmware are built for the same real type");
@@ -21,6 +23,8 @@ _Static_assert(sizeof(OSQPFloat) == sizeof(taper_real_t),
  * be wrong; and at the end of a slice their approximate form would throw the iterates away.
  */
 #define NEVER_INFEASIBLE ((OSQPFloat)1e-20)
+/** A plan whose rows are further off than this many tolerances is refused: OSQP's own "inaccurate" is ten. */
+#define RESIDUAL_FACTOR 10
 /** Least penalty, and that of a fresh solver: below it the primal residual stands still. */
 #define LEAST_RHO ((OSQPFloat)0.3)
 /** The penalty is looked at again after every so many iterations, and changed if it is this factor off. */
@@ -31,25 +35,25 @@ _Static_assert(TAPER_MIN_SLICE <= RHO_INTERVAL && RHO_INTERVAL % TAPER_MIN_SLICE
                "slices end where OSQP looks");
 _Static_assert(TAPER_MAX_ITERATIONS % RHO_INTERVAL == 0, "the budget is a number of intervals");
 
-static bool solver_fits(const taper_solver_t *solver, const taper_station_config_t *config) {
+static bool solver_fits(const taper_solver_t *solver, const taper_horizon_t *horizon) {
+    const taper_station_config_t *config = horizon->config;
     const OSQPInt variables = (OSQPInt)config->connector_count * config->steps;
     return solver->connectors == config->connector_count && solver->steps == config->steps &&
-           solver->groups == config->group_count && solver->variables == variables &&
-           solver->rows == 2 * variables + (OSQPInt)config->group_count * config->steps;
+           solver->sums == horizon->sum_count && solver->variables == variables &&
+           solver->rows == 2 * variables + (OSQPInt)horizon->sum_count * config->steps;
 }
 
-/** Hand the constraint matrix's values over if the tapers changed: that costs a factorisation. */
-static bool load_matrix(taper_planner_t *planner) {
-    const taper_horizon_t *horizon = &planner->horizon;
-    const size_t size = horizon->config->connector_count * sizeof planner->keep[0];
-    if (planner->matrix_is_current && memcmp(planner->keep, horizon->taper_keep, size) == 0) {
+/** Hand the matrices' values over if they changed, by tapers or by what connectors count: that costs a factorisation. */
+static bool load_matrices(taper_planner_t *planner) {
+    const taper_solver_t *solver = planner->solver;
+    const taper_written_t hessian = taper_write_hessian(solver);
+    const taper_written_t constraints = taper_write_constraints(solver, &planner->horizon);
+    if (planner->matrix_is_current && !hessian.changed && !constraints.changed) {
         return true;
     }
-    const taper_solver_t *solver = planner->solver;
-    (void)taper_write_constraints(solver, horizon->config, horizon->taper_keep);
-    memcpy(planner->keep, horizon->taper_keep, size);
-    planner->matrix_is_current =
-        osqp_update_data_mat(solver->osqp, NULL, NULL, 0, solver->a_values, NULL, solver->a_count) == 0;
+    planner->matrix_is_current = hessian.count == solver->p_count && constraints.count == solver->a_count &&
+                                 osqp_update_data_mat(solver->osqp, solver->p_values, NULL, solver->p_count,
+                                                      solver->a_values, NULL, solver->a_count) == 0;
     return planner->matrix_is_current;
 }
 
@@ -68,17 +72,8 @@ taper_status_t taper_planner_init(taper_planner_t *planner, const taper_solver_t
                                   const taper_station_config_t *config) {
     memset(planner, 0, sizeof *planner);
     planner->solver = solver;
-    planner->horizon.config = config;
-    if (!solver_fits(solver, config)) {
-        return TAPER_ERR_CONFIG;
-    }
-    for (uint8_t i = 0; i < config->connector_count; i++) {
-        planner->keep[i] = 1;
-    }
-    if (taper_write_hessian(solver) != solver->p_count ||
-        taper_write_constraints(solver, config, planner->keep) != solver->a_count ||
-        osqp_update_data_mat(solver->osqp, solver->p_values, NULL, solver->p_count, solver->a_values, NULL,
-                             solver->a_count) != 0) {
+    taper_horizon_shape(&planner->horizon, config);
+    if (!solver_fits(solver, &planner->horizon) || !load_matrices(planner)) {
         return TAPER_ERR_CONFIG;
     }
     solver->osqp->settings->eps_abs = ABSOLUTE_TOLERANCE;
@@ -87,70 +82,6 @@ taper_status_t taper_planner_init(taper_planner_t *planner, const taper_solver_t
     solver->osqp->settings->eps_dual_inf = NEVER_INFEASIBLE;
     reset(planner);
     return TAPER_OK;
-}
-
-/** Move one connector's part of a row block by `shift` steps; what comes in at the end repeats the last value. */
-static void shift_block(OSQPFloat *values, uint8_t count, uint8_t shift, OSQPFloat factor) {
-    for (uint8_t t = 0; t < count; t++) {
-        const uint8_t from = (uint8_t)(t + shift < count ? t + shift : count - 1);
-        values[t] = values[from] * factor;
-    }
-}
-
-static void clear_block(OSQPFloat *values, uint8_t count) {
-    memset(values, 0, count * sizeof values[0]);
-}
-
-/** One vehicle's energies and multipliers, `shift` steps later. */
-static void shift_vehicle(const taper_planner_t *planner, uint8_t i, uint8_t shift, OSQPFloat growth) {
-    const taper_station_config_t *config = planner->horizon.config;
-    const uint8_t steps = config->steps;
-    OSQPFloat *chain = planner->solver->osqp->solution->x + (size_t)i * steps;
-    OSQPFloat *y = planner->solver->osqp->solution->y;
-    const OSQPFloat charged = shift > 0 ? chain[shift - 1] : 0;
-    shift_block(chain, steps, shift, 1);
-    for (uint8_t t = 0; t < steps; t++) {
-        chain[t] -= charged;
-    }
-    shift_block(y + (size_t)i * steps, steps, shift, growth);
-    shift_block(y + taper_first_taper_row(config) + (size_t)i * (steps - 1U), (uint8_t)(steps - 1), shift,
-                growth);
-    y[taper_first_target_row(config) + i] *= growth;
-}
-
-/** Nothing is known of this connector's vehicle. */
-static void clear_vehicle(const taper_planner_t *planner, uint8_t i) {
-    const taper_station_config_t *config = planner->horizon.config;
-    const uint8_t steps = config->steps;
-    OSQPFloat *y = planner->solver->osqp->solution->y;
-    clear_block(planner->solver->osqp->solution->x + (size_t)i * steps, steps);
-    clear_block(y + (size_t)i * steps, steps);
-    clear_block(y + taper_first_taper_row(config) + (size_t)i * (steps - 1U), (uint8_t)(steps - 1));
-    y[taper_first_target_row(config) + i] = 0;
-}
-
-/** The last answer as a starting point: `shift` steps later, and without the vehicles that are new or gone. */
-static void warm_start(taper_planner_t *planner, const taper_snapshot_t *snapshot, uint8_t shift) {
-    const taper_station_config_t *config = planner->horizon.config;
-    OSQPSolver *osqp = planner->solver->osqp;
-    OSQPFloat growth = 1; /* the cost of a step is TAPER_DISCOUNT of the one before: so are the multipliers */
-    for (uint8_t k = 0; k < shift; k++) {
-        growth /= TAPER_DISCOUNT;
-    }
-    for (uint8_t i = 0; i < config->connector_count; i++) {
-        const uint8_t session = snapshot->demand[i].active ? snapshot->demand[i].session : 0;
-        if (session == 0 || session != planner->session[i]) {
-            clear_vehicle(planner, i);
-        } else {
-            shift_vehicle(planner, i, shift, growth);
-        }
-        planner->session[i] = session;
-    }
-    for (uint8_t k = 0; k < config->group_count; k++) {
-        OSQPFloat *sums = osqp->solution->y + taper_first_sum_row(config) + (size_t)k * config->steps;
-        shift_block(sums, config->steps, shift, growth);
-    }
-    osqp_warm_start(osqp, osqp->solution->x, osqp->solution->y);
 }
 
 static uint8_t steps_since(const taper_planner_t *planner, uint32_t now_ms) {
@@ -169,10 +100,10 @@ void taper_planner_start(taper_planner_t *planner, const taper_snapshot_t *snaps
     }
     taper_horizon_build(horizon, horizon->config, snapshot, course);
     const bool accepted =
-        osqp_update_data_vec(planner->solver->osqp, horizon->linear, horizon->lower, horizon->upper) == 0 &&
-        load_matrix(planner);
+        load_matrices(planner) &&
+        osqp_update_data_vec(planner->solver->osqp, horizon->linear, horizon->lower, horizon->upper) == 0;
     if (accepted) {
-        warm_start(planner, snapshot, shift);
+        taper_warm_start(planner, snapshot, shift);
     }
     planner->verdict = accepted ? TAPER_VERDICT_SOLVING : TAPER_VERDICT_REFUSED;
     planner->iterations = 0;
@@ -193,6 +124,18 @@ static bool all_finite(const OSQPFloat *values, OSQPInt count) {
     return true;
 }
 
+/** Whether the rows hold by our own account: the solver's says nothing if its memory is not what we gave it. */
+static bool rows_hold(const taper_planner_t *planner) {
+    const taper_residual_t residual = taper_residual(&planner->horizon, planner->solver->osqp->solution->x);
+    const taper_real_t tolerance = ABSOLUTE_TOLERANCE + RELATIVE_TOLERANCE * residual.size;
+    return residual.worst <= RESIDUAL_FACTOR * tolerance + ABSOLUTE_TOLERANCE;
+}
+
+static bool has_stopped(const taper_planner_t *planner) {
+    return planner->solver->osqp->info->status_val == OSQP_SOLVED ||
+           planner->iterations >= TAPER_MAX_ITERATIONS;
+}
+
 /** Verdict on a solver that stopped. `osqp_solve` returns 0 whatever happened: only the status tells. */
 static taper_verdict_t judge(const taper_planner_t *planner) {
     const taper_solver_t *solver = planner->solver;
@@ -201,16 +144,20 @@ static taper_verdict_t judge(const taper_planner_t *planner) {
         status == OSQP_PRIMAL_INFEASIBLE_INACCURATE || status == OSQP_DUAL_INFEASIBLE_INACCURATE) {
         return TAPER_VERDICT_REFUSED; /* standing still is always feasible: a numerical fault */
     }
-    if (!all_finite(solver->osqp->solution->x, solver->variables)) {
+    if (!all_finite(solver->osqp->solution->x, solver->variables) ||
+        !all_finite(solver->osqp->solution->y, solver->rows)) {
         return TAPER_VERDICT_NOT_FINITE;
     }
-    if (status == OSQP_SOLVED) {
-        return TAPER_VERDICT_SOLVED;
-    }
-    if (planner->iterations < TAPER_MAX_ITERATIONS) {
+    if (!has_stopped(planner)) {
         return TAPER_VERDICT_SOLVING;
     }
-    return status == OSQP_SOLVED_INACCURATE ? TAPER_VERDICT_INACCURATE : TAPER_VERDICT_LATE;
+    if (status != OSQP_SOLVED && status != OSQP_SOLVED_INACCURATE) {
+        return TAPER_VERDICT_LATE;
+    }
+    if (!rows_hold(planner)) {
+        return TAPER_VERDICT_RESIDUAL;
+    }
+    return status == OSQP_SOLVED ? TAPER_VERDICT_SOLVED : TAPER_VERDICT_INACCURATE;
 }
 
 /**

@@ -12,7 +12,8 @@ struct taper_solver {
     OSQPFloat *p_values; /**< values of the upper triangle of the Hessian, likewise [p_count] */
     OSQPInt p_count;
     OSQPInt variables, rows;
-    uint8_t connectors, steps, groups;
+    uint8_t connectors, steps;
+    uint16_t sums; /**< rows of limits in each step */
 };
 
 #endif

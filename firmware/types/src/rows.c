@@ -3,8 +3,8 @@
 /** sqrt(3) - 1, rounded up [permille]. */
 #define FACET_permille 733
 #define FULL_permille  1000
-/** Three-phase current on a delta side: sqrt(3), rounded up to what a connector of unknown wiring counts. */
-#define DELTA_MOST_permille 2000
+/** Three-phase current on a delta side: sqrt(3), rounded up [permille]. */
+#define BALANCED_permille 1733
 
 typedef enum { FAMILY_POWER, FAMILY_LINE, FAMILY_DELTA, FAMILY_DIFFERENCE } family_t;
 
@@ -89,7 +89,11 @@ static int32_t delta_permille(const taper_booking_t *booking, unsigned line, boo
     }
     const bool windings = has_phase(booking, line) && has_phase(booking, line + 2u);
     const bool one = has_phase(booking, line) || has_phase(booking, line + 2u);
-    return windings ? DELTA_MOST_permille : one ? FULL_permille : 0;
+    if (windings) {
+        return booking->line_to_line ? 2 * FULL_permille
+                                     : BALANCED_permille; /* between lines: any of three */
+    }
+    return one ? FULL_permille : 0;
 }
 
 static int32_t difference_permille(const taper_booking_t *booking, unsigned line) {
@@ -107,7 +111,9 @@ int32_t taper_row_weight(const taper_booking_t *booking, taper_row_kind_t kind) 
     case FAMILY_DIFFERENCE:
     default: permille = difference_permille(booking, place.line); break;
     }
-    return permille * booking->permille / FULL_permille;
+    const int64_t thousandths = (int64_t)permille * booking->permille;
+    return (int32_t)((thousandths + (thousandths > 0 ? FULL_permille - 1 : 0)) /
+                     FULL_permille); /* rounded up */
 }
 
 uint8_t taper_rotation_phases(taper_rotation_t rotation, uint8_t conductors) {
@@ -145,15 +151,24 @@ taper_booking_t taper_booking_nominal(const taper_station_config_t *config, uint
                              .line_to_line = connector->line_to_line};
 }
 
+/** Least power of 1 A that counts for connector `i`: what its demand draws, with losses; else by the description. */
+static int32_t least_W_per_A(const taper_station_config_t *config, const taper_snapshot_t *snapshot,
+                             uint8_t i) {
+    const taper_demand_t *demand = &snapshot->demand[i];
+    if (demand->active) {
+        const int32_t efficiency =
+            config->connectors[i].is_dc ? config->connectors[i].efficiency_permille : FULL_permille;
+        return (int32_t)(((int64_t)demand->W_per_A * FULL_permille + efficiency - 1) / efficiency);
+    }
+    const bool is_told = demand->booking.phases != 0 && demand->booking.W_per_A != 0;
+    return is_told ? demand->booking.W_per_A : taper_booking_nominal(config, i).W_per_A;
+}
+
 taper_booking_t taper_booking_now(const taper_station_config_t *config, const taper_snapshot_t *snapshot,
                                   uint8_t i) {
-    const taper_demand_t *demand = &snapshot->demand[i];
-    taper_booking_t booking =
-        demand->booking.phases == 0 ? taper_booking_nominal(config, i) : demand->booking;
-    if (demand->booking.phases == 0 && demand->active) {
-        booking.W_per_A = demand->W_per_A;
-    }
-    booking.W_per_A = taper_max_i32(booking.W_per_A, demand->booking.W_per_A);
+    const taper_booking_t *told = &snapshot->demand[i].booking;
+    taper_booking_t booking = told->phases == 0 ? taper_booking_nominal(config, i) : *told;
+    booking.W_per_A = taper_max_i32(told->W_per_A, least_W_per_A(config, snapshot, i));
     return booking;
 }
 
@@ -168,13 +183,20 @@ bool taper_group_contains(const taper_station_config_t *config, uint8_t k, uint8
     return false;
 }
 
+bool taper_row_plans(const taper_station_config_t *config, uint8_t group, taper_row_kind_t kind, uint8_t i) {
+    if (!taper_group_contains(config, group, i)) {
+        return false;
+    }
+    const taper_booking_t booking = taper_booking_nominal(config, i);
+    return taper_row_weight(&booking, kind) != 0;
+}
+
 bool taper_row_is_planned(const taper_station_config_t *config, uint8_t group, taper_row_kind_t kind) {
     if (taper_row_limit(config, group, kind) == TAPER_NO_LIMIT) {
         return false;
     }
     for (uint8_t i = 0; i < config->connector_count; i++) {
-        const taper_booking_t booking = taper_booking_nominal(config, i);
-        if (taper_group_contains(config, group, i) && taper_row_weight(&booking, kind) != 0) {
+        if (taper_row_plans(config, group, kind, i)) {
             return true;
         }
     }

@@ -10,11 +10,16 @@
  *     rate      0 <= u(i,t) <= rate limit, 0 outside the stay            (paper, eq. 1 and 3)
  *     taper     u(i,t) + a_i v(i,t-1) <= limit at the present SOC        (paper, eq. 5; at t = 0 part of rate)
  *     target    v(i,T-1) <= need
- *     sum       sum of u over the connectors of group k <= P_k(t)        (paper, eq. 2)
+ *     sum       sum of c_ri u(i,t) over the connectors of row r <= P_r(t)  (paper, eq. 2)
  *
- * The variable (i,t) has index i*T + t. Rows stand in the order rate [N*T], taper [N*(T-1)], target [N], sum [K*T].
+ * The sum rows are the planned ones of the feeder tree (taper/rows.h), by ascending group and kind: power, currents of
+ * lines; differences of phases are bounded on both sides. c_ri is the supply's power, or its current times the site's
+ * voltage, per power of the vehicle. A connector is in a row if its description says so; what the snapshot says changes
+ * its c_ri, to 0 too, but puts it into no other row.
+ *
+ * The variable (i,t) has index i*T + t. Rows stand in the order rate [N*T], taper [N*(T-1)], target [N], sum [R*T].
  * What does not apply is masked by bounds (l = u, or unbounded), never by the cost: that converges 2-5 times faster.
- * A rate is also limited by the site's limit, which says nothing new but lets a limit of 0 converge at once.
+ * A rate is also limited by the site's limits, which says nothing new but lets a limit of 0 converge at once.
  * Target and sum rows are scaled as below, which saves about a third of the iterations.
  */
 #ifndef TAPER_HORIZON_H
@@ -35,7 +40,14 @@
 #define TAPER_TARGET_SCALE ((taper_real_t)0.58)
 
 #define TAPER_MAX_VARIABLES (TAPER_MAX_CONNECTORS * TAPER_MAX_STEPS)
-#define TAPER_MAX_ROWS      (2 * TAPER_MAX_VARIABLES + TAPER_MAX_GROUPS * TAPER_MAX_STEPS)
+#define TAPER_MAX_ROWS      (2 * TAPER_MAX_VARIABLES + TAPER_MAX_PLAN_ROWS * TAPER_MAX_STEPS)
+
+/** One limit, in every step: T sum rows. */
+typedef struct {
+    uint8_t group;
+    uint8_t kind;       /**< taper_row_kind_t */
+    taper_real_t scale; /**< factor of its rows: sqrt(5 / connectors in it) */
+} taper_sum_t;
 
 typedef struct {
     const taper_station_config_t *config;
@@ -44,11 +56,21 @@ typedef struct {
     taper_real_t lower[TAPER_MAX_ROWS];       /**< row bounds; +-TAPER_REAL_UNBOUNDED: none */
     taper_real_t upper[TAPER_MAX_ROWS];
     taper_real_t taper_keep[TAPER_MAX_CONNECTORS]; /**< 1 - a_i: taper row (i,t) is v(i,t) - keep v(i,t-1) */
+    uint16_t sum_count;
+    taper_sum_t sum[TAPER_MAX_PLAN_ROWS];
+    taper_real_t weight[TAPER_MAX_PLAN_ROWS]
+                       [TAPER_MAX_CONNECTORS]; /**< of u(i,t) in the sum rows: c_ri, scaled; 0: not in it */
 } taper_horizon_t;
 
 /**
+ * What of the problem follows from the station's description alone: `config`, `base_W`, the list of the sums, their
+ * weights with all conductors in use, and no taper. Cost: O(groups x connectors x depth of the tree).
+ */
+void taper_horizon_shape(taper_horizon_t *horizon, const taper_station_config_t *config);
+
+/**
  * State the problem for `snapshot` and what is known of the coming steps.
- * Cost: O(connectors x steps + groups x (steps + connectors x depth of the tree)). `horizon->config` is `config` afterwards.
+ * Cost: O(connectors x steps + sums x (steps + connectors x depth of the tree)). `horizon->config` is `config` afterwards.
  */
 void taper_horizon_build(taper_horizon_t *horizon, const taper_station_config_t *config,
                          const taper_snapshot_t *snapshot, const taper_course_t *course);
@@ -69,8 +91,5 @@ static inline size_t taper_first_target_row(const taper_station_config_t *config
 static inline size_t taper_first_sum_row(const taper_station_config_t *config) {
     return (size_t)config->connector_count * 2U * config->steps;
 }
-
-/** Factor of the sum rows of group `k`: sqrt(5 / connectors in it), 0 for a group without any. */
-taper_real_t taper_horizon_sum_scale(const taper_station_config_t *config, uint8_t k);
 
 #endif

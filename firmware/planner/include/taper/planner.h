@@ -38,12 +38,11 @@ typedef struct {
     const taper_solver_t *solver;
     taper_horizon_t horizon; /**< the problem being solved */
     taper_verdict_t verdict;
-    uint16_t iterations;                     /**< spent on the present problem */
-    uint8_t slices;                          /**< of the present problem */
-    uint32_t started_ms;                     /**< time of the snapshot that the problem is for */
-    uint8_t session[TAPER_MAX_CONNECTORS];   /**< whose trajectory the warm start holds; 0: nobody's */
-    bool matrix_is_current;                  /**< the solver holds the taper values of `horizon` */
-    taper_real_t keep[TAPER_MAX_CONNECTORS]; /**< the taper values that it holds */
+    uint16_t iterations;                   /**< spent on the present problem */
+    uint8_t slices;                        /**< of the present problem */
+    uint32_t started_ms;                   /**< time of the snapshot that the problem is for */
+    uint8_t session[TAPER_MAX_CONNECTORS]; /**< whose trajectory the warm start holds; 0: nobody's */
+    bool matrix_is_current;                /**< the solver's factorisation is that of its matrices' values */
 } taper_planner_t;
 
 /**

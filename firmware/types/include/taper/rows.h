@@ -12,7 +12,8 @@
  *   |I| = sqrt(x^2 + x y + y^2) <= max(x, y) + (sqrt(3) - 1) min(x, y). Exact for x = 0, y = 0 and x = y. One row for each of
  *   the two linear parts: the second one is `..._B`.
  * - The delta side of a delta-wye transformer, referred to the wye side: line a carries |AB + BC - 2 CA| <=
- *   max(AB, BC) + 2 CA. Exact for each alone, for AB = BC and for balanced load. Again two rows.
+ *   max(AB, BC) + 2 CA. Exact for each alone, for AB = BC and for balanced load. Again two rows. A current to neutral
+ *   counts once on each of the two lines that its winding is between, a three-phase one sqrt(3) times on all.
  *
  * Both bounds follow from convexity: the left side is sublinear, the right side is linear between rays where they agree.
  */
@@ -51,7 +52,10 @@ int32_t taper_row_limit(const taper_station_config_t *config, uint8_t group, tap
 int32_t taper_row_limit_now(const taper_station_config_t *config, const taper_supply_t *supply, uint8_t group,
                             taper_row_kind_t kind);
 
-/** What 1 A of setpoint adds to a row: W, or permille of an ampere. Negative in differences only. Cost: constant. */
+/**
+ * What 1 A of setpoint adds to a row: W, or permille of an ampere, rounded up. Negative in differences only.
+ * Cost: constant.
+ */
 int32_t taper_row_weight(const taper_booking_t *booking, taper_row_kind_t kind);
 
 /**
@@ -67,8 +71,10 @@ taper_booking_t taper_booking_now(const taper_station_config_t *config, const ta
 /** Supply phases of the first `conductors` (1..3) of a connector that is wired like `rotation`: bit 0 L1 .. bit 2 L3. */
 uint8_t taper_rotation_phases(taper_rotation_t rotation, uint8_t conductors);
 
-/** Whether the planner has this row: it is limited, and some connector below `group` has a weight in it by its
-    description. Cost: O(connectors x depth). */
+/** Whether connector `i` is in this row of the planner: below `group`, with a weight by its description. Cost: O(depth). */
+bool taper_row_plans(const taper_station_config_t *config, uint8_t group, taper_row_kind_t kind, uint8_t i);
+
+/** Whether the planner has this row: it is limited, and some connector is in it. Cost: O(connectors x depth). */
 bool taper_row_is_planned(const taper_station_config_t *config, uint8_t group, taper_row_kind_t kind);
 
 /** Whether connector `i` hangs below group `k` of the feeder tree. Cost: O(depth). */
