@@ -2,7 +2,8 @@
 """The most energy that any policy could deliver to these sessions: the clairvoyant linear programme.
 
 It knows every arrival, departure and state of charge in advance, keeps the site limit and the taper of every vehicle,
-and ignores the number of connectors and minimum currents. taperlib/clairvoyant.py states it in full.
+with --station also the limits of its feeders and phases for the sessions that name their connector, and ignores the
+number of connectors and minimum currents. taperlib/clairvoyant.py states it in full.
 """
 
 import argparse
@@ -11,6 +12,7 @@ from pathlib import Path
 
 from taperlib.cases import add_limit_arguments, limit_of_options
 from taperlib.clairvoyant import clairvoyant_bound
+from taperlib.feeders import feeder_rows
 from taperlib.files import InputError
 from taperlib.numbers import positive
 from taperlib.sessions import read_sessions_csv, requested_kwh
@@ -20,6 +22,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sessions", type=Path, required=True, help="sessions CSV")
     add_limit_arguments(parser)
+    parser.add_argument("--station", help="hold the limits of this station's feeder tree too (codegen/stations/NAME.toml)")
     parser.add_argument("--step-s", type=positive, default=900.0, help="step of the programme [s] (default 900)")
     parser.add_argument("--tick-s", type=positive,
                         help="the controller's tick [s]: the power follows the taper within a step (default: --step-s)")
@@ -31,7 +34,8 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         sessions = read_sessions_csv(options.sessions)
         site = limit_of_options(options, sessions)
-        bound = clairvoyant_bound(sessions, site.limit, options.step_s, options.tick_s)
+        feeders = feeder_rows(options.station, sessions) if options.station else []
+        bound = clairvoyant_bound(sessions, site.limit, options.step_s, options.tick_s, feeders)
     except InputError as error:
         print(f"bound: {error}", file=sys.stderr)
         return 1

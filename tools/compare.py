@@ -19,10 +19,11 @@ from rich.table import Table
 
 from taperlib.cases import SiteLimit, add_limit_arguments, limit_of_options
 from taperlib.clairvoyant import clairvoyant_bound
+from taperlib.feeders import feeder_rows, station_file
 from taperlib.files import InputError
 from taperlib.measures import Measures, measures_of, rows_above_limit
-from taperlib.numbers import not_negative, positive
-from taperlib.report import HEADINGS, Comparison, cell_text, write_comparison
+from taperlib.numbers import not_negative, positive, share
+from taperlib.report import Comparison, cell_text, headings_of, write_comparison
 from taperlib.sessions import read_sessions_csv, requested_kwh
 from taperlib.simulator import POLICIES, Run, SimulationError, run_policy
 
@@ -31,7 +32,7 @@ DEFAULT_SIMULATOR = Path("build/host-release/host_sim/taper-sim")
 PARALLEL_RUNS = 2
 BOUND_STEP_S = 900.0
 WIDTH_OF_ALL_COLUMNS = 160
-MAIN_COLUMNS = ("policy", "energy_kwh", "share_of_bound_percent", "satisfied", "violations", "solve_ms_p50")
+MAIN_COLUMNS = ("policy", "energy_kwh", "share_of_bound_percent", "satisfied", "violations", "solve_ms_p50", "cost")
 EXIT_RUN_FAILED, EXIT_LIMIT_EXCEEDED = 1, 3
 
 
@@ -48,9 +49,12 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sessions", type=Path, required=True, help="sessions CSV")
     add_limit_arguments(parser)
-    parser.add_argument("--station", default="garage", help="hub, garage, depot, paper or caltech (default garage)")
+    parser.add_argument("--station", default="garage", help="one of codegen/stations (default garage)")
     parser.add_argument("--tick-s", type=positive, default=60.0, help="control tick [s] (default 60)")
     parser.add_argument("--min-current-a", type=not_negative, help="least current of a connector that charges [A]")
+    parser.add_argument("--price-csv", type=Path, help="CSV time_s,price_per_kwh: each price holds until the next")
+    parser.add_argument("--price-weight", type=share,
+                        help="weight of the price against having energy early, 0 to 1 (default: the station's)")
     parser.add_argument("--policies", type=_policies, default=list(POLICIES),
                         help=f"comma-separated (default {','.join(POLICIES)})")
     parser.add_argument("--out", type=Path, default=Path("build/compare"), help="folder (default build/compare)")
@@ -65,7 +69,18 @@ def _simulator_arguments(options: argparse.Namespace, site: SiteLimit) -> list[s
                  "--tick-s", f"{options.tick_s:g}"]
     if options.min_current_a is not None:
         arguments += ["--min-current-a", f"{options.min_current_a:g}"]
+    if options.price_csv is not None:
+        arguments += ["--price-csv", str(options.price_csv)]
+    if options.price_weight is not None:
+        arguments += ["--price-weight", f"{options.price_weight:g}"]
     return arguments
+
+
+def _price_text(options: argparse.Namespace) -> str | None:
+    if options.price_csv is None:
+        return None
+    weight = "" if options.price_weight is None else f" with weight {options.price_weight:g}"
+    return options.price_csv.name + weight
 
 
 def _run_all(options: argparse.Namespace, arguments: list[str], folder: Path, progress: Progress) -> list[Run]:
@@ -94,7 +109,8 @@ def _compare(options: argparse.Namespace, runs_folder: Path, console: Console) -
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console) as progress:
         bound_task = progress.add_task("clairvoyant bound", total=1)
-        bound = clairvoyant_bound(sessions, site.limit, max(BOUND_STEP_S, options.tick_s), options.tick_s)
+        feeders = feeder_rows(options.station, sessions) if station_file(options.station).is_file() else []
+        bound = clairvoyant_bound(sessions, site.limit, max(BOUND_STEP_S, options.tick_s), options.tick_s, feeders)
         progress.update(bound_task, completed=1)
         runs = _run_all(options, _simulator_arguments(options, site), runs_folder, progress)
     return Comparison(
@@ -102,6 +118,7 @@ def _compare(options: argparse.Namespace, runs_folder: Path, console: Console) -
         station=options.station,
         sessions_file=options.sessions.name,
         limit_text=site.text,
+        price_text=_price_text(options),
         tick_s=options.tick_s,
         bound_kwh=bound.energy_kwh,
         bound_solve_s=bound.solve_s,
@@ -115,7 +132,7 @@ def _compare(options: argparse.Namespace, runs_folder: Path, console: Console) -
 def _print_table(table: list[Measures], bound_kwh: float, console: Console) -> None:
     """All columns where they fit; in a narrower terminal those that matter most, the rest is in the report."""
     fits = console.width >= WIDTH_OF_ALL_COLUMNS or not console.is_terminal
-    headings = [heading for heading in HEADINGS if fits or heading[0] in MAIN_COLUMNS]
+    headings = [heading for heading in headings_of(table) if fits or heading[0] in MAIN_COLUMNS]
     caption = f"Clairvoyant bound: {bound_kwh:,.1f} kWh" + ("" if fits else "; more columns in the report")
     shown = Table(caption=caption, caption_justify="left", header_style="bold")
     for name, heading, unit in headings:

@@ -1,7 +1,7 @@
 /**
- * The gateway's end of the limit curve: the known course of the site limit goes ahead to the station, over ISO-TP as
- * docs/transfers.md has it. It is sent again each day of the world, earlier if it is too long for one transfer, when the
- * station has lost it, and as long as the station does not accept it.
+ * The gateway's end of the curves: the known courses of the site limit and of the price of energy go ahead to the station, one
+ * after the other, over ISO-TP as docs/transfers.md has it. Each is sent again each day of the world, earlier if it is too
+ * long for one transfer, when the station has lost it, and as long as the station does not accept it.
  *
  * The caller moves frames, as with taper_isotp_t: those received go to sim_curve_take(), what sim_curve_next() gives is to
  * be sent. Two times: `unix_s` is the wall clock that TIME_SYNC tells; `now_ms` is a clock of the bus, which may wrap.
@@ -23,15 +23,23 @@ typedef enum {
     SIM_CURVE_WAITING, /**< for the answer, or after a failure until the next try */
 } sim_curve_state_t;
 
+/** What is told. */
+typedef enum { SIM_CURVE_LIMITS, SIM_CURVE_PRICES, SIM_CURVE_TOPICS } sim_curve_topic_t;
+
 typedef struct {
-    const sim_limits_t *limits; /**< NULL: there is no limit to tell */
+    const sim_course_t *course; /**< NULL: there is none to tell */
+    int64_t due_s;              /**< when it goes out again at the latest */
+    int64_t next_due_s;         /**< that, once what is on its way is accepted */
+    bool lost;                  /**< the station has forgotten it */
+} sim_told_t;
+
+typedef struct {
+    sim_told_t told[SIM_CURVE_TOPICS];
+    sim_curve_topic_t topic; /**< of what is, or was last, on its way */
     sim_curve_state_t state;
     uint32_t waiting_since_ms;
-    int64_t due_s;      /**< when it goes out again at the latest */
-    int64_t next_due_s; /**< that, once what is on its way is accepted */
-    bool lost;          /**< the station has forgotten it */
-    uint32_t accepted;  /**< transfers that the station took; never falls */
-    uint32_t tries;     /**< transfers begun; never falls */
+    uint32_t accepted; /**< transfers that the station took; never falls */
+    uint32_t tries;    /**< transfers begun; never falls */
     taper_isotp_t link;
     taper_e2e_receiver_t status_check;
     uint32_t status_ms; /**< last CTRL_STATUS heard */
@@ -40,7 +48,10 @@ typedef struct {
 } sim_curve_t;
 
 /** Nothing sent yet. `limits` must outlive the curve; a constant limit is never sent, SITE_LIMIT says it all. */
-void sim_curve_init(sim_curve_t *curve, const sim_limits_t *limits);
+void sim_curve_init(sim_curve_t *curve, const sim_course_t *limits);
+
+/** Tell prices as well, which must outlive the curve; a constant price too. NULL: none. */
+void sim_curve_set_prices(sim_curve_t *curve, const sim_course_t *prices);
 
 /** Take in a frame. @return whether it was one of the transfer; others are left alone. */
 bool sim_curve_take(sim_curve_t *curve, const taper_frame_t *frame, uint32_t now_ms);

@@ -32,7 +32,8 @@ typedef struct {
     taper_socketcan_t can;
     taper_port_t port;
     sim_sessions_t sessions;
-    sim_limits_t limits; /**< count 0: none */
+    sim_course_t limits; /**< count 0: none */
+    sim_course_t prices; /**< likewise */
     sim_results_t results;
     sim_field_t field;
     int64_t recorded_s; /**< last step that was recorded */
@@ -45,6 +46,7 @@ static bool open_buses(ev_t *ev) {
         {FIRST_NODE_ID(TAPER_MESSAGE_SETPOINT), ALL_NODES},
         {FIRST_NODE_ID(TAPER_MESSAGE_CTRL_STATUS), ALL_NODES},
         {FIRST_NODE_ID(TAPER_MESSAGE_CTRL_DIAG), ALL_NODES},
+        {FIRST_NODE_ID(TAPER_MESSAGE_OUTLOOK), ALL_NODES},
         {FIRST_NODE_ID(TAPER_MESSAGE_ISOTP_TO) | TAPER_NODE_GATEWAY, ONE_NODE},
     };
     const taper_socketcan_options_t options = {.interfaces = ev->options->interfaces,
@@ -68,6 +70,7 @@ static bool load(ev_t *ev) {
                               ? taper_stations[options->station]->connector_count
                               : TAPER_MAX_CONNECTORS;
     return sim_sessions_load(&ev->sessions, options->sessions_file, most) &&
+           (options->price_file == NULL || sim_prices_load(&ev->prices, options->price_file)) &&
            (options->out == NULL || sim_output_check(options->out));
 }
 
@@ -125,6 +128,7 @@ static void start_field(ev_t *ev, bool *closed) {
                                        .sessions = &ev->sessions,
                                        .outcome = ev->results.outcome,
                                        .limits = has_limit(options) ? &ev->limits : NULL,
+                                       .prices = options->price_file != NULL ? &ev->prices : NULL,
                                        .closed = closed,
                                        .world_start_s = first_arrival_s(&ev->sessions),
                                        .time_scale = options->time_scale,
@@ -143,6 +147,18 @@ static unsigned count_active(const sim_field_t *field) {
     return active;
 }
 
+static void record_connector(ev_t *ev, int64_t step_s, unsigned i) {
+    const sim_evse_t *evse = &ev->field.evse[i];
+    const sim_connector_row_t row = {
+        .time_s = step_s,
+        .connector = i,
+        .evse = evse,
+        .soc = sim_evse_soc(evse),
+        .current_A = evse->current_A,
+        .outlook = sim_watch_outlook(&ev->field.watch, evse->config->bus, evse->config->node)};
+    sim_results_connector(&ev->results, &row);
+}
+
 static void record(ev_t *ev) {
     const sim_field_t *field = &ev->field;
     const int64_t step_s = (int64_t)floor(sim_field_world_s(field)) / RECORD_S * RECORD_S;
@@ -156,7 +172,7 @@ static void record(ev_t *ev) {
                      field->watch.mode);
     for (unsigned i = 0; i < ev->station->connector_count; i++) {
         if (field->evse[i].vehicle != NULL) {
-            sim_results_connector(&ev->results, step_s, i, &field->evse[i]);
+            record_connector(ev, step_s, i);
         }
     }
 }
@@ -264,7 +280,8 @@ int main(int argc, char **argv) {
         taper_socketcan_close(&ev->can);
     }
     sim_sessions_free(&ev->sessions);
-    sim_limits_free(&ev->limits);
+    sim_course_free(&ev->limits);
+    sim_course_free(&ev->prices);
     free(ev);
     return fflush(stdout) == 0 ? code : SIM_EXIT_INPUT;
 }

@@ -24,10 +24,8 @@ static const char description[] =
     "batteries, limits "
     "and the clock run N times faster. The controller needs the same option. At 600 a day takes 144 s.\n"
     "\n"
-    "SESSIONS CSV and LIMIT CSV: as in taper-sim --help. The course of the limit is sent ahead too (ISO-TP), "
-    "and "
-    "again when "
-    "the controller restarts.\n"
+    "SESSIONS CSV, LIMIT CSV and PRICE CSV: as in taper-sim --help. The courses of limit and price are sent "
+    "ahead (ISO-TP), and again when the controller restarts.\n"
     "\n"
     "CONNECTORS: numbers and ranges, such as 1,4-8. Other processes play the others; sessions that name one "
     "of these are "
@@ -50,6 +48,7 @@ enum {
     KEY_SCALE,
     KEY_LIMIT,
     KEY_LIMIT_CSV,
+    KEY_PRICE_CSV,
     KEY_CONNECTORS,
     KEY_NO_GATEWAY,
     KEY_NO_TAPER,
@@ -65,6 +64,7 @@ static const struct argp_option options[] = {
     {"time-scale", KEY_SCALE, "N", 0, "World seconds in a second of the bus, 1..1000 (default: 1)", 0},
     {"limit-kw", KEY_LIMIT, "X", 0, "Site limit that the gateway tells [kW] (default: none)", 0},
     {"limit-csv", KEY_LIMIT_CSV, "FILE", 0, "Site limit over time (CSV, see below)", 0},
+    {"price-csv", KEY_PRICE_CSV, "FILE", 0, "Price of energy over time (CSV, see below)", 0},
     {"connectors", KEY_CONNECTORS, "LIST", 0, "Play only these connectors (default: all)", 0},
     {"no-gateway", KEY_NO_GATEWAY, NULL, 0, "Play no energy gateway: no clock, no limit", 0},
     {"no-taper", KEY_NO_TAPER, NULL, 0, "Keep the vehicles' taper back (EV_PARAM_D)", 0},
@@ -140,8 +140,8 @@ static void check(const ev_options_t *chosen, struct argp_state *state) {
     if (chosen->limit_file != NULL && chosen->limit_kw >= 0.0) {
         argp_error(state, "--limit-kw and --limit-csv exclude each other");
     }
-    if (chosen->no_gateway && limited) {
-        argp_error(state, "--no-gateway: there is nobody then to tell a limit");
+    if (chosen->no_gateway && (limited || chosen->price_file != NULL)) {
+        argp_error(state, "--no-gateway: there is nobody then to tell a limit or a price");
     }
     if (chosen->station < taper_station_count &&
         chosen->last_played > taper_stations[chosen->station]->connector_count) {
@@ -162,6 +162,7 @@ static error_t parse(int key, char *text, struct argp_state *state) {
         break;
     case KEY_LIMIT: chosen->limit_kw = taper_argument_not_negative("--limit-kw", text, state); break;
     case KEY_LIMIT_CSV: chosen->limit_file = text; break;
+    case KEY_PRICE_CSV: chosen->price_file = text; break;
     case KEY_CONNECTORS: set_connectors(chosen, text, state); break;
     case KEY_NO_GATEWAY: chosen->no_gateway = true; break;
     case KEY_NO_TAPER: chosen->no_taper = true; break;

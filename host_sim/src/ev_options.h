@@ -14,6 +14,7 @@ typedef struct {
     const char *interfaces[TAPER_SOCKETCAN_BUSES];
     uint8_t interface_count;
     const char *sessions_file;
+    const char *price_file; /**< NULL: none */
     const char *limit_file; /**< NULL: none */
     const char *out;        /**< NULL: no files */
     unsigned station;       /**< index in taper_stations[]; taper_station_count: found on the bus */

@@ -29,6 +29,7 @@ static void begin_session(sim_evse_t *evse) {
     evse->session = (uint8_t)(evse->session == UINT8_MAX ? 1 : evse->session + 1);
     evse->revision = (uint8_t)((evse->revision + 1) % 16);
     evse->counted_from_kwh = evse->energy_kwh;
+    evse->conductors_seen = false;
 }
 
 void sim_evse_plug(sim_evse_t *evse, const sim_session_t *session) {
@@ -67,8 +68,22 @@ bool sim_evse_wants(const sim_evse_t *evse) {
     return evse->vehicle != NULL && sim_evse_missing_kwh(evse) > ENERGY_TOLERANCE_KWH;
 }
 
+uint8_t sim_evse_conductors(const sim_evse_t *evse) {
+    const uint8_t own = evse->config->phases;
+    const uint8_t vehicle = evse->vehicle == NULL ? 0 : evse->vehicle->phases;
+    return vehicle == 0 || vehicle > own ? own : vehicle;
+}
+
+uint8_t sim_evse_told_conductors(const sim_evse_t *evse) {
+    return evse->conductors_seen ? sim_evse_conductors(evse) : evse->config->phases;
+}
+
 double sim_evse_kw_per_A(const sim_evse_t *evse) {
-    return (double)evse->config->voltage_mV * (double)evse->config->phases / 1e6;
+    return (double)evse->config->voltage_mV * (double)sim_evse_conductors(evse) / 1e6;
+}
+
+double sim_evse_takes_kw(const sim_evse_t *evse) {
+    return fmax(evse->vehicle->max_kw - evse->vehicle->taper_kw * sim_evse_soc(evse), 0.0);
 }
 
 bool sim_evse_hear(sim_evse_t *evse, const taper_frame_t *frame) {
@@ -104,11 +119,10 @@ int32_t sim_evse_offered_mA(const sim_evse_t *evse, int32_t setpoint_mA) {
 }
 
 void sim_evse_draw(sim_evse_t *evse, int32_t offered_mA, double most_kw) {
-    const sim_session_t *vehicle = evse->vehicle;
     const double offered_kw = (double)offered_mA / 1000.0 * sim_evse_kw_per_A(evse);
-    const double taper_kw = fmax(vehicle->max_kw - vehicle->taper_kw * sim_evse_soc(evse), 0.0);
-    evse->power_kw = fmin(fmin(offered_kw, taper_kw), most_kw);
+    evse->power_kw = fmin(offered_kw, most_kw);
     evse->current_A = evse->power_kw / sim_evse_kw_per_A(evse);
+    evse->conductors_seen = evse->conductors_seen || evse->power_kw > 0.0;
 }
 
 int sim_setpoint_connector(const taper_station_config_t *station, const taper_frame_t *frame) {

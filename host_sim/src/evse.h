@@ -32,9 +32,10 @@ typedef struct {
     const sim_session_t *vehicle; /**< NULL: none */
     double energy_kwh;            /**< into the battery since plug-in */
     double counted_from_kwh;      /**< of this, before the controller began to count: it restarted since */
-    double current_A;             /**< per phase, drawn now */
-    double power_kw;
-    int32_t setpoint_mA; /**< per phase, what the vehicle may draw now: see sim_evse_obey() */
+    double current_A;             /**< on each conductor in use, drawn now */
+    double power_kw;              /**< of the vehicle: the losses of a DC converter do not count */
+    bool conductors_seen;         /**< the vehicle has drawn: how many conductors it uses is known */
+    int32_t setpoint_mA;          /**< per phase, what the vehicle may draw now: see sim_evse_obey() */
     int32_t told_mA;     /**< by the last accepted setpoint; it and the next two are 0 until there is one */
     int32_t fallback_mA; /**< by the same */
     int32_t validity_ms; /**< by the same */
@@ -68,8 +69,17 @@ double sim_evse_missing_kwh(const sim_evse_t *evse);
 /** Whether a vehicle is there that is still below its target. */
 bool sim_evse_wants(const sim_evse_t *evse);
 
-/** Power of 1 A on every phase [kW]. */
+/** Conductors that the vehicle uses: those that it shares with the connector; without a vehicle all of the connector's. */
+uint8_t sim_evse_conductors(const sim_evse_t *evse);
+
+/** The same as the connector reports it: all of its own until the vehicle has drawn. */
+uint8_t sim_evse_told_conductors(const sim_evse_t *evse);
+
+/** Power of 1 A on every conductor in use [kW]. */
 double sim_evse_kw_per_A(const sim_evse_t *evse);
+
+/** Most that charger and battery of the vehicle take at the present SOC [kW]. */
+double sim_evse_takes_kw(const sim_evse_t *evse);
 
 /**
  * A connector hears a SETPOINT frame. It accepts one that passes the end-to-end check and is for its session (0 without
@@ -85,7 +95,7 @@ void sim_evse_obey(sim_evse_t *evse);
 /** Current per phase on offer at a setpoint: nothing below the connector's minimum, and no more than its maximum. */
 int32_t sim_evse_offered_mA(const sim_evse_t *evse, int32_t setpoint_mA);
 
-/** Draw, at an offer, what charger and battery take at the present SOC, and at most `most_kw`: sets power and current. */
+/** Draw what an offer allows, and at most `most_kw`: sets power and current. */
 void sim_evse_draw(sim_evse_t *evse, int32_t offered_mA, double most_kw);
 
 /** A frame with what it says now. All but SIM_EVSE_STATUS and SIM_EVSE_INFO need a vehicle. */

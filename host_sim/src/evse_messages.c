@@ -26,7 +26,7 @@ static taper_message_t evse_status(const sim_evse_t *evse) {
     status->pilot = evse->vehicle == NULL  ? TAPER_PILOT_A
                     : sim_evse_wants(evse) ? TAPER_PILOT_C
                                            : TAPER_PILOT_B;
-    for (unsigned phase = 0; phase < evse->config->phases && phase < 3; phase++) {
+    for (unsigned phase = 0; phase < sim_evse_conductors(evse) && phase < 3; phase++) {
         status->current_mA[phase] = nearest(evse->current_A * 1000.0);
     }
     status->contactor_closed = evse->vehicle != NULL && sim_evse_offered_mA(evse, evse->setpoint_mA) > 0;
@@ -34,7 +34,7 @@ static taper_message_t evse_status(const sim_evse_t *evse) {
     status->fallback_active = !evse->in_force;
     status->ev_present = evse->vehicle != NULL;
     status->setpoint_echo = evse->setpoint_echo;
-    status->phases = evse->config->phases;
+    status->phases = sim_evse_told_conductors(evse);
     return message;
 }
 
@@ -109,7 +109,7 @@ static taper_message_t evse_info(const sim_evse_t *evse) {
                                               .kind = config->is_dc         ? TAPER_KIND_DC
                                                       : config->phases == 3 ? TAPER_KIND_AC3
                                                                             : TAPER_KIND_AC1,
-                                              .rotation = TAPER_ROTATION_123,
+                                              .rotation = evse->config->rotation,
                                               .firmware = FIRMWARE}};
 }
 

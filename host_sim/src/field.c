@@ -9,6 +9,11 @@
 /** Frames taken in one poll. A babbling bus cannot hold it up. */
 #define MOST_FRAMES 4096
 
+static void start_curve(sim_field_t *field) {
+    sim_curve_init(&field->curve, field->options.limits);
+    sim_curve_set_prices(&field->curve, field->options.prices);
+}
+
 void sim_field_init(sim_field_t *field, const sim_field_options_t *options, uint32_t now_ms) {
     *field = (sim_field_t){.options = *options, .last_ms = now_ms, .queue_s = INT64_MIN};
     sim_field_options_t *own = &field->options;
@@ -21,7 +26,7 @@ void sim_field_init(sim_field_t *field, const sim_field_options_t *options, uint
     }
     sim_queue_init(&field->queue, own->sessions, field->evse, station->connector_count, own->outcome);
     sim_gateway_init(&field->gateway, own->limits, own->port, 0, own->seed);
-    sim_curve_init(&field->curve, own->limits);
+    start_curve(field);
     sim_field_start_gateway(field);
     sim_tracker_init(&field->tracker, station, own->grace_ms == 0 ? SIM_GRACE_ms : own->grace_ms);
 }
@@ -125,22 +130,23 @@ static void draw(sim_field_t *field, unsigned i) {
     evse->power_kw = 0.0;
     evse->current_A = 0.0;
     if (sim_evse_wants(evse)) {
-        sim_evse_draw(evse, node->followed_mA, (double)INFINITY);
+        sim_evse_draw(evse, node->followed_mA, sim_evse_takes_kw(evse));
     }
 }
 
-/** Most that a connector lets its vehicle draw, whatever that wants [kW]. */
-static double may_kw(const sim_evse_t *evse) {
-    const int32_t offered_mA = evse->vehicle == NULL ? 0 : sim_evse_offered_mA(evse, evse->setpoint_mA);
-    return (double)offered_mA / 1000.0 * sim_evse_kw_per_A(evse);
+/** Most that a connector lets its vehicle draw, whatever that wants [A]. */
+static double may_A(const sim_evse_t *evse) {
+    return evse->vehicle == NULL ? 0.0 : (double)sim_evse_offered_mA(evse, evse->setpoint_mA) / 1000.0;
 }
 
 static void look(sim_field_t *field) {
-    double drawn[TAPER_MAX_CONNECTORS];
-    double may[TAPER_MAX_CONNECTORS];
-    for (unsigned i = 0; i < field->options.station->connector_count; i++) {
-        drawn[i] = field->evse[i].power_kw;
-        may[i] = may_kw(&field->evse[i]);
+    const taper_station_config_t *station = field->options.station;
+    sim_load_t drawn[TAPER_MAX_CONNECTORS];
+    sim_load_t may[TAPER_MAX_CONNECTORS];
+    for (unsigned i = 0; i < station->connector_count; i++) {
+        const sim_evse_t *evse = &field->evse[i];
+        drawn[i] = sim_load_of(station, i, sim_evse_conductors(evse), evse->current_A);
+        may[i] = sim_load_of(station, i, sim_evse_conductors(evse), may_A(evse));
     }
     sim_tracker_look(&field->tracker, (uint64_t)field->now_ms, sim_field_limit_kw(field), drawn, may);
 }
@@ -172,7 +178,7 @@ void sim_field_power_off(sim_field_t *field, unsigned node) {
     if (node == SIM_GATEWAY) {
         field->gateway.counter[0] = 0;
         field->gateway.counter[1] = 0;
-        sim_curve_init(&field->curve, field->options.limits);
+        start_curve(field);
         sim_field_start_gateway(field);
     } else {
         sim_evse_restart(&field->evse[node]);

@@ -40,7 +40,8 @@ typedef struct {
         *port; /**< the field's end of the bus: `receive` and `send` are called, nothing else */
     const sim_sessions_t *sessions;
     sim_outcome_t *outcome;     /**< [sessions->count] */
-    const sim_limits_t *limits; /**< NULL: the gateway sets no limit */
+    const sim_course_t *limits; /**< NULL: the gateway sets no limit */
+    const sim_course_t *prices; /**< NULL: the gateway tells none */
     const bool *closed;         /**< [connector_count] these connectors are not played; NULL: all are */
     double world_start_s;
     uint32_t time_scale; /**< 0 is 1 */

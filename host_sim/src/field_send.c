@@ -108,8 +108,8 @@ static void send_time(sim_field_t *field) {
 static void send_limit(sim_field_t *field) {
     const double world_s = sim_field_world_s(field);
     const double limit_kw = sim_gateway_limit_at_kw(&field->gateway, world_s);
-    const sim_limits_t *limits = field->options.limits;
-    const uint32_t key = limits == NULL ? 1 : (uint32_t)sim_limits_point(limits, world_s) + 1;
+    const sim_course_t *limits = field->options.limits;
+    const uint32_t key = limits == NULL ? 1 : (uint32_t)sim_course_point(limits, world_s) + 1;
     if (!sim_slot_is_due(&field->limit_slot, &limit_cycle, field->now_ms, key)) {
         return;
     }

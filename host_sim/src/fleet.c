@@ -16,11 +16,8 @@ void sim_fleet_init(sim_fleet_t *fleet, const taper_station_config_t *station, c
     }
 }
 
-bool sim_fleet_report(sim_fleet_t *fleet, unsigned connector) {
-    sim_evse_t *evse = &fleet->evse[connector];
-    // Without a vehicle the heartbeat alone; EV_PARAM_D, the last, only where the taper is told.
-    const unsigned present = fleet->tells_taper ? SIM_EV_PARAM_D + 1 : SIM_EV_PARAM_D;
-    const unsigned count = evse->vehicle == NULL ? SIM_EVSE_STATUS + 1 : present;
+/** Send the first `count` kinds of frames. */
+static bool send_first(sim_fleet_t *fleet, sim_evse_t *evse, unsigned count) {
     bool sent = true;
     for (unsigned k = 0; k < count; k++) {
         const taper_message_t message = sim_evse_message(evse, (sim_evse_frame_t)k);
@@ -29,15 +26,26 @@ bool sim_fleet_report(sim_fleet_t *fleet, unsigned connector) {
     return sent;
 }
 
-bool sim_fleet_echo(sim_fleet_t *fleet, unsigned connector) {
+bool sim_fleet_report(sim_fleet_t *fleet, unsigned connector) {
     sim_evse_t *evse = &fleet->evse[connector];
-    const taper_message_t message = sim_evse_message(evse, SIM_EVSE_STATUS);
-    return sim_wire_send(fleet->port, &message, &evse->counter[SIM_EVSE_STATUS]);
+    // Without a vehicle the heartbeat alone; EV_PARAM_D, the last, only where the taper is told.
+    const unsigned present = fleet->tells_taper ? SIM_EV_PARAM_D + 1 : SIM_EV_PARAM_D;
+    return send_first(fleet, evse, evse->vehicle == NULL ? SIM_EVSE_STATUS + 1 : present);
 }
 
-void sim_fleet_begin(sim_fleet_t *fleet) {
+bool sim_fleet_echo(sim_fleet_t *fleet, unsigned connector, bool whole) {
+    sim_evse_t *evse = &fleet->evse[connector];
+    const unsigned count = whole && evse->vehicle != NULL ? SIM_EVSE_ELEC + 1 : SIM_EVSE_STATUS + 1;
+    return send_first(fleet, evse, count);
+}
+
+void sim_fleet_begin(sim_fleet_t *fleet, int64_t now_s) {
+    fleet->begin_s = (double)now_s;
     for (unsigned i = 0; i < fleet->station->connector_count; i++) {
-        fleet->evse[i].in_force = false;
+        sim_evse_t *evse = &fleet->evse[i];
+        evse->in_force = false;
+        fleet->takes_kw[i] = evse->vehicle == NULL ? 0.0 : sim_evse_takes_kw(evse);
+        fleet->offered_mA[i] = -1;
     }
 }
 
@@ -59,24 +67,34 @@ void sim_fleet_hear(sim_fleet_t *fleet) {
     }
 }
 
-/** How long the vehicle is there in the tick that begins at `now_s` [h]. */
-static double stay_h(const sim_fleet_t *fleet, const sim_evse_t *evse, double now_s) {
-    return fmin(fleet->tick_s, evse->vehicle->departure_s - now_s) / 3600.0;
+/** How long the vehicle is there between two times of the present tick [h]. */
+static double stay_h(const sim_evse_t *evse, double from_s, double to_s) {
+    return fmax(fmin(to_s, evse->vehicle->departure_s) - from_s, 0.0) / 3600.0;
 }
 
-void sim_fleet_draw(sim_fleet_t *fleet, unsigned connector, double now_s) {
+bool sim_fleet_draw(sim_fleet_t *fleet, unsigned connector, double now_s) {
     sim_evse_t *evse = &fleet->evse[connector];
+    const int32_t offered_mA = sim_evse_wants(evse) ? sim_evse_offered_mA(evse, evse->setpoint_mA) : 0;
+    if (offered_mA == fleet->offered_mA[connector]) {
+        return false;
+    }
+    fleet->offered_mA[connector] = offered_mA;
     evse->power_kw = 0.0;
     evse->current_A = 0.0;
-    if (sim_evse_wants(evse)) {
-        const double missing_kw = sim_evse_missing_kwh(evse) / stay_h(fleet, evse, now_s);
-        sim_evse_draw(evse, sim_evse_offered_mA(evse, evse->setpoint_mA), missing_kw);
+    const double left_h = evse->vehicle == NULL ? 0.0 : stay_h(evse, now_s, fleet->begin_s + fleet->tick_s);
+    if (offered_mA > 0 && left_h > 0.0) {
+        const double missing_kw = sim_evse_missing_kwh(evse) / left_h;
+        sim_evse_draw(evse, offered_mA, fmin(fleet->takes_kw[connector], missing_kw));
     }
+    return true;
 }
 
-void sim_fleet_charge(sim_fleet_t *fleet, unsigned connector, double now_s) {
+double sim_fleet_charge(sim_fleet_t *fleet, unsigned connector, double from_s, double to_s) {
     sim_evse_t *evse = &fleet->evse[connector];
-    if (evse->vehicle != NULL) {
-        evse->energy_kwh += evse->power_kw * stay_h(fleet, evse, now_s);
+    if (evse->vehicle == NULL) {
+        return 0.0;
     }
+    const double energy_kwh = evse->power_kw * stay_h(evse, from_s, to_s);
+    evse->energy_kwh += energy_kwh;
+    return energy_kwh;
 }

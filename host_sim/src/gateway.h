@@ -9,7 +9,7 @@
 #include "taper/port.h"
 
 typedef struct {
-    const sim_limits_t *limits; /**< NULL: it sets none */
+    const sim_course_t *limits; /**< NULL: it sets none */
     const taper_port_t *port;
     int64_t tick_s;
     uint8_t counter[2]; /**< TIME_SYNC, SITE_LIMIT */
@@ -19,11 +19,14 @@ typedef struct {
  * `limits` and `port`, the world's end of the bus, must outlive the gateway. The counters start from bits of `seed`.
  * `tick_s` is for a gateway that reports once per control tick: the two functions below; 0 for another.
  */
-void sim_gateway_init(sim_gateway_t *gateway, const sim_limits_t *limits, const taper_port_t *port,
+void sim_gateway_init(sim_gateway_t *gateway, const sim_course_t *limits, const taper_port_t *port,
                       int64_t tick_s, uint64_t seed);
 
 /** Send TIME_SYNC, and SITE_LIMIT with the limit of the tick that begins at `now_s`. @return false: the bus is full. */
 bool sim_gateway_report(sim_gateway_t *gateway, int64_t now_s);
+
+/** Say the same again at `passed_s` into that tick. @return false: the bus is full. */
+bool sim_gateway_repeat(sim_gateway_t *gateway, int64_t now_s, double passed_s);
 
 /** Limit of the tick that begins at `now_s`: the least that holds in it [kW]. */
 double sim_gateway_limit_kw(const sim_gateway_t *gateway, int64_t now_s);

@@ -34,6 +34,9 @@ static station_copy_t copy_station(const sim_options_t *options) {
     }
     copy.config.connectors = copy.connectors;
     copy.config.tick_ms = options->tick_s * 1000U;
+    if (options->price_weight >= 0.0) {
+        copy.config.price_weight_permille = (int32_t)lround(options->price_weight * 1000.0);
+    }
     return copy;
 }
 
@@ -46,6 +49,8 @@ static int run_case(const sim_options_t *options, const sim_case_t *run) {
     results.tick_s = options->tick_s;
     results.min_current_A = options->min_current_A;
     results.seed = run->seed;
+    results.priced = run->prices != NULL;
+    results.price_weight = options->price_weight;
     int code = SIM_EXIT_INPUT;
     if (sim_world_run(run, &results) && (options->out == NULL || sim_results_write(&results, options->out))) {
         sim_results_print(&results, stdout);
@@ -85,13 +90,15 @@ static void note_missing_planner(const sim_options_t *options) {
 
 /** With all options known: read the files and run. @return the exit code of the program. */
 static int load_and_run(const sim_options_t *options, const taper_station_config_t *station) {
-    sim_limits_t limits = {0};
+    sim_course_t limits = {0};
+    sim_course_t prices = {0};
     sim_sessions_t sessions = {0};
     FILE *problems = NULL;
     int code = SIM_EXIT_INPUT;
     if (sim_sessions_load(&sessions, options->sessions_file, station->connector_count) &&
         sim_limits_choose(&limits, options->limit_file, options->limit_kw,
                           station->groups[0].limit_W / 1000.0) &&
+        (options->price_file == NULL || sim_prices_load(&prices, options->price_file)) &&
         (options->out == NULL || sim_output_check(options->out)) && open_problems(options, &problems)) {
         note_missing_planner(options);
         const sim_case_t run = {.station = station,
@@ -99,6 +106,7 @@ static int load_and_run(const sim_options_t *options, const taper_station_config
                                 .policy = options->policy,
                                 .sessions = &sessions,
                                 .limits = &limits,
+                                .prices = options->price_file == NULL ? NULL : &prices,
                                 .seed = options->seed,
                                 .problems = problems};
         code = run_case(options, &run);
@@ -107,7 +115,8 @@ static int load_and_run(const sim_options_t *options, const taper_station_config
         }
     }
     sim_sessions_free(&sessions);
-    sim_limits_free(&limits);
+    sim_course_free(&limits);
+    sim_course_free(&prices);
     return code;
 }
 

@@ -20,11 +20,16 @@ static const char description[] =
     "\v"
     "SESSIONS CSV: a header, then one row per session, columns in any order: session_id, connector (1.., "
     "empty: the first free one), arrival_s, departure_s [s], battery_kwh [kWh], soc_arrival, soc_target "
-    "[0..1], max_kw, taper_kw [kW], and optionally expected_departure_s [s], which is what the driver tells. "
+    "[0..1], max_kw, taper_kw [kW], and optionally expected_departure_s [s], which is what the driver tells, "
+    "and phases (1 or 3, empty: all of the connector's) that the charger uses. "
     "A vehicle takes at most max_kw - taper_kw * SOC.\n"
     "\n"
     "LIMIT CSV: time_s [s], ascending, and limit_kw [kW]; each limit holds until the next one, the first one "
     "before its time too. The station's own limit holds besides.\n"
+    "\n"
+    "PRICE CSV: time_s [s], ascending, and price_per_kwh in any currency, -32.767..32.767; each price holds "
+    "until "
+    "the next one, the first one before its time too.\n"
     "\n"
     "OUTPUT in DIR: summary.json, sessions.csv, steps.csv, connectors.csv. Equal runs give equal bytes, "
     "except for solve_ms in summary.json, which is wall time. A session that is plugged in at the first tick "
@@ -47,6 +52,8 @@ enum {
     KEY_STATION,
     KEY_LIMIT,
     KEY_LIMIT_CSV,
+    KEY_PRICE_CSV,
+    KEY_PRICE_WEIGHT,
     KEY_TICK,
     KEY_MINIMUM,
     KEY_SEED,
@@ -67,6 +74,10 @@ static const struct argp_option options[] = {
     {"station", KEY_STATION, "NAME", 0, "Station to simulate (default: garage)", 0},
     {"limit-kw", KEY_LIMIT, "X", 0, "Site limit [kW] (default: the station's own)", 0},
     {"limit-csv", KEY_LIMIT_CSV, "FILE", 0, "Site limit over time, known in advance (CSV, see below)", 0},
+    {"price-csv", KEY_PRICE_CSV, "FILE", 0, "Price of energy over time, known in advance (CSV, see below)",
+     0},
+    {"price-weight", KEY_PRICE_WEIGHT, "W", 0,
+     "Weight of the price against having energy early, 0..1 (default: the station's own)", 0},
     {"tick-s", KEY_TICK, "N", 0, "Control tick [s], 1..3600 (default: 60)", 0},
     {"min-current-a", KEY_MINIMUM, "X", 0,
      "Least current per phase [A] of every connector; 0: any (default: the station's own)", 0},
@@ -117,6 +128,13 @@ static void set_policy(sim_options_t *chosen, const char *name, struct argp_stat
     chosen->policy = sim_policy_find(name);
     if (chosen->policy == NULL) {
         argp_error(state, "--policy: unknown policy '%s'; there are %s", name, policy_names(false));
+    }
+}
+
+static void set_price_weight(sim_options_t *chosen, const char *text, struct argp_state *state) {
+    chosen->price_weight = taper_argument_not_negative("--price-weight", text, state);
+    if (chosen->price_weight > 1.0) {
+        argp_error(state, "--price-weight: above 1: '%s'", text);
     }
 }
 
@@ -229,6 +247,8 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     case KEY_STATION: chosen->station = taper_argument_station("--station", text, state); break;
     case KEY_LIMIT: chosen->limit_kw = taper_argument_not_negative("--limit-kw", text, state); break;
     case KEY_LIMIT_CSV: chosen->limit_file = text; break;
+    case KEY_PRICE_CSV: chosen->price_file = text; break;
+    case KEY_PRICE_WEIGHT: set_price_weight(chosen, text, state); break;
     case KEY_TICK:
         chosen->tick_s = (uint32_t)taper_argument_whole("--tick-s", text, 1, LONGEST_TICK_S, state);
         break;
@@ -256,8 +276,11 @@ double sim_least_maximum_A(const taper_station_config_t *station) {
 sim_options_t sim_options_parse(int argc, char **argv) {
     static const struct argp parser = {
         .options = options, .parser = parse, .doc = description, .help_filter = add_names};
-    sim_options_t chosen = {
-        .limit_kw = -1.0, .min_current_A = -1.0, .tick_s = 60, .replay.setup = taper_setup_default(0)};
+    sim_options_t chosen = {.limit_kw = -1.0,
+                            .min_current_A = -1.0,
+                            .price_weight = -1.0,
+                            .tick_s = 60,
+                            .replay.setup = taper_setup_default(0)};
     chosen.replay.setup.time_scale = 0; // not given
     while (chosen.station < taper_station_count &&
            strcmp(taper_stations[chosen.station]->name, DEFAULT_STATION) != 0) {

@@ -14,12 +14,14 @@
 typedef struct {
     const char *sessions_file;
     const char *limit_file;    /**< NULL: none */
+    const char *price_file;    /**< NULL: none */
     const char *out;           /**< NULL: no files */
     const char *problems_file; /**< NULL: none */
     const sim_policy_t *policy;
     unsigned station;     /**< index in taper_stations[] */
     double limit_kw;      /**< negative: not given */
     double min_current_A; /**< negative: the station's own */
+    double price_weight;  /**< 0..1; negative: the station's own */
     uint32_t tick_s;
     uint64_t seed;
     sim_replay_options_t replay; /**< its file is NULL: no replay, a run */

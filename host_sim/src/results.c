@@ -11,6 +11,7 @@
 
 #include "memory.h"
 #include "output.h"
+#include "words.h"
 
 /** A session that leaves with this much less than its target is satisfied still. */
 #define SOC_TOLERANCE 0.01
@@ -39,13 +40,15 @@ static void free_text(sim_text_t *text) {
 }
 
 void sim_results_init(sim_results_t *results, const sim_sessions_t *sessions, bool records) {
-    *results = (sim_results_t){.sessions = sessions, .min_current_A = -1.0};
+    *results = (sim_results_t){.sessions = sessions, .min_current_A = -1.0, .price_weight = -1.0};
     results->outcome = sim_allocate(sessions->count, sizeof *results->outcome);
     if (records) {
         open_text(&results->steps);
         open_text(&results->connectors);
         fputs("time_s,limit_kw,power_kw,active,mode\n", results->steps.stream);
-        fputs("time_s,connector,session_id,setpoint_a,current_a,soc\n", results->connectors.stream);
+        fputs("time_s,connector,session_id,setpoint_a,current_a,soc,reason,waiting_place,waiting_of,"
+              "soc_estimated,expected_soc,short_kwh,because\n",
+              results->connectors.stream);
     }
 }
 
@@ -58,22 +61,12 @@ void sim_results_free(sim_results_t *results) {
     *results = (sim_results_t){0};
 }
 
-static const char *mode_name(taper_mode_t mode) {
-    switch (mode) {
-    case TAPER_MODE_INIT: return "init";
-    case TAPER_MODE_PLAN: return "plan";
-    case TAPER_MODE_FALLBACK: return "fallback";
-    case TAPER_MODE_FAILSAFE: return "failsafe";
-    default: return "unknown";
-    }
-}
-
 void sim_results_step(sim_results_t *results, int64_t time_s, double limit_kw, double power_kw,
                       unsigned active, taper_mode_t mode) {
     results->peak_kw = fmax(results->peak_kw, power_kw);
     if (results->steps.stream != NULL) {
         fprintf(results->steps.stream, "%" PRId64 ",%.4f,%.4f,%u,%s\n", time_s, limit_kw, power_kw, active,
-                mode_name(mode));
+                sim_mode_word(mode));
     }
 }
 
@@ -86,15 +79,50 @@ static void put_field(FILE *stream, const char *text) {
     }
 }
 
-void sim_results_connector(sim_results_t *results, int64_t time_s, unsigned connector,
-                           const sim_evse_t *evse) {
+/** Whether the station expects the vehicle to leave with less than it wants. */
+static bool leaves_short(const taper_outlook_t *outlook) {
+    return outlook->short_Wh != TAPER_ABSENT && outlook->short_Wh > 0;
+}
+
+static void put_outlook(FILE *stream, const taper_outlook_t *outlook) {
+    fprintf(stream, ",%s,%u,%u,%d,", sim_reason_word(outlook->reason), outlook->waiting_place,
+            outlook->waiting_of, outlook->soc_estimated ? 1 : 0);
+    if (outlook->soc_at_departure_permille != TAPER_ABSENT) {
+        fprintf(stream, "%.3f", outlook->soc_at_departure_permille / 1000.0);
+    }
+    fputc(',', stream);
+    if (outlook->short_Wh != TAPER_ABSENT) {
+        fprintf(stream, "%.3f", outlook->short_Wh / 1000.0);
+    }
+    fprintf(stream, ",%s\n", leaves_short(outlook) ? sim_reason_word(outlook->because) : "");
+}
+
+/** The last outlook of a session is its verdict. */
+static void keep_verdict(sim_results_t *results, const sim_connector_row_t *row) {
+    const size_t session = (size_t)(row->evse->vehicle - results->sessions->session);
+    sim_outcome_t *outcome = &results->outcome[session];
+    outcome->told = true;
+    outcome->reason = row->outlook->reason;
+    outcome->because = row->outlook->because;
+    outcome->leaves_short = leaves_short(row->outlook);
+}
+
+void sim_results_connector(sim_results_t *results, const sim_connector_row_t *row) {
     FILE *stream = results->connectors.stream;
+    if (row->outlook != NULL) {
+        keep_verdict(results, row);
+    }
     if (stream == NULL) {
         return;
     }
-    fprintf(stream, "%" PRId64 ",%u,", time_s, connector + 1);
-    put_field(stream, evse->vehicle->id);
-    fprintf(stream, ",%.3f,%.3f,%.5f\n", evse->setpoint_mA / 1000.0, evse->current_A, sim_evse_soc(evse));
+    fprintf(stream, "%" PRId64 ",%u,", row->time_s, row->connector + 1);
+    put_field(stream, row->evse->vehicle->id);
+    fprintf(stream, ",%.3f,%.3f,%.5f", row->evse->setpoint_mA / 1000.0, row->current_A, row->soc);
+    if (row->outlook != NULL) {
+        put_outlook(stream, row->outlook);
+    } else {
+        fputs(",,,,,,,\n", stream);
+    }
 }
 
 static double soc_departure(const sim_session_t *session, const sim_outcome_t *outcome) {
@@ -121,7 +149,8 @@ static totals_t sum_up(const sim_results_t *results) {
 
 /** The text of sessions.csv. */
 static void put_sessions(const sim_results_t *results, FILE *stream) {
-    fputs("session_id,connector,energy_kwh,soc_departure,satisfied,short_kwh,queued_s\n", stream);
+    fputs("session_id,connector,energy_kwh,soc_departure,satisfied,short_kwh,queued_s,reason,because\n",
+          stream);
     for (size_t i = 0; i < results->sessions->count; i++) {
         const sim_session_t *session = &results->sessions->session[i];
         const sim_outcome_t *outcome = &results->outcome[i];
@@ -132,8 +161,10 @@ static void put_sessions(const sim_results_t *results, FILE *stream) {
             fputc(',', stream);
         }
         const double short_kwh = fmax(sim_session_request_kwh(session) - outcome->energy_kwh, 0.0);
-        fprintf(stream, ",%.4f,%.5f,%d,%.4f,%.3f\n", outcome->energy_kwh, soc_departure(session, outcome),
-                satisfied(session, outcome) ? 1 : 0, short_kwh, outcome->queued_s);
+        fprintf(stream, ",%.4f,%.5f,%d,%.4f,%.3f,%s,%s\n", outcome->energy_kwh,
+                soc_departure(session, outcome), satisfied(session, outcome) ? 1 : 0, short_kwh,
+                outcome->queued_s, outcome->told ? sim_reason_word(outcome->reason) : "",
+                outcome->leaves_short ? sim_reason_word(outcome->because) : "");
     }
 }
 
@@ -142,6 +173,15 @@ static void add_fixed(cJSON *object, const char *name, double value, int decimal
     char text[64];
     snprintf(text, sizeof text, "%.*f", decimals, value);
     cJSON_AddRawToObject(object, name, text);
+}
+
+/** The same, or null. */
+static void add_given(cJSON *object, const char *name, bool given, double value, int decimals) {
+    if (given) {
+        add_fixed(object, name, value, decimals);
+    } else {
+        cJSON_AddNullToObject(object, name);
+    }
 }
 
 static void add_count(cJSON *object, const char *name, uint64_t value) {
@@ -175,15 +215,15 @@ static char *summary_json(sim_results_t *results) {
     add_spread(object, "solve_ms", &results->solve_ms, 3);
     add_fixed(object, "peak_kw", results->peak_kw, 4);
     add_count(object, "tick_s", (uint64_t)results->tick_s);
-    if (results->min_current_A >= 0.0) {
-        add_fixed(object, "min_current_a", results->min_current_A, 3);
-    } else {
-        cJSON_AddNullToObject(object, "min_current_a");
-    }
+    add_given(object, "min_current_a", results->min_current_A >= 0.0, results->min_current_A, 3);
     add_count(object, "seed", results->seed);
     add_count(object, "queued", totals.queued);
     add_count(object, "never_plugged_in", totals.never_plugged_in);
     add_count(object, "guard_violations", results->guard_violations);
+    const bool per_kwh = results->priced && totals.delivered_kwh > 0.0;
+    add_given(object, "energy_cost", results->priced, results->cost, 4);
+    add_given(object, "cost_per_kwh", per_kwh, per_kwh ? results->cost / totals.delivered_kwh : 0.0, 5);
+    add_given(object, "price_weight", results->price_weight >= 0.0, results->price_weight, 3);
     char *text = cJSON_Print(object);
     cJSON_Delete(object);
     return text;
@@ -223,6 +263,10 @@ void sim_results_print(sim_results_t *results, FILE *stream) {
     fprintf(stream,
             "%zu queued, %zu never plugged in; %" PRIu32 " fallback ticks, %" PRIu32 " limit violations\n",
             totals.queued, totals.never_plugged_in, results->fallback_ticks, results->violation_ticks);
+    if (results->priced) {
+        fprintf(stream, "the energy cost %.2f, %.4f per kWh delivered\n", results->cost,
+                totals.delivered_kwh > 0.0 ? results->cost / totals.delivered_kwh : 0.0);
+    }
     if (results->solves > 0) {
         const sim_spread_t iterations = sim_samples_spread(&results->iterations);
         const sim_spread_t solve_ms = sim_samples_spread(&results->solve_ms);

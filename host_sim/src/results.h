@@ -16,12 +16,17 @@
 #include "sessions.h"
 #include "stats.h"
 #include "taper/bus.h"
+#include "taper/message.h"
 
 /** What became of one session. */
 typedef struct {
     unsigned connector; /**< 1..; 0: it never found a free one */
     double energy_kwh;
     double queued_s; /**< from arrival until plugged in, or until it gave up; 0 if served at its first tick */
+    bool told;       /**< the station told an outlook for it; the next two are of the last one */
+    uint8_t reason;  /**< taper_reason_t */
+    uint8_t because; /**< taper_reason_t, meaningful if it was to leave short of energy */
+    bool leaves_short;
 } sim_outcome_t;
 
 /** A text file that is being made in memory. */
@@ -39,6 +44,9 @@ typedef struct {
     sim_text_t steps, connectors;
     sim_samples_t iterations, solve_ms;
     double peak_kw;
+    bool priced;         /**< `cost` means something */
+    double cost;         /**< of the energy drawn from the grid, in the currency of the prices */
+    double price_weight; /**< negative: the station's own */
     int64_t tick_s;
     uint64_t seed;
     double min_current_A; /**< negative: the station's own */
@@ -55,9 +63,17 @@ void sim_results_init(sim_results_t *results, const sim_sessions_t *sessions, bo
 void sim_results_step(sim_results_t *results, int64_t time_s, double limit_kw, double power_kw,
                       unsigned active, taper_mode_t mode);
 
-/** One tick of an occupied connector (from 0), before its vehicle is charged. */
-void sim_results_connector(sim_results_t *results, int64_t time_s, unsigned connector,
-                           const sim_evse_t *evse);
+/** One tick of an occupied connector. */
+typedef struct {
+    int64_t time_s;
+    unsigned connector;             /**< from 0 */
+    const sim_evse_t *evse;         /**< its vehicle is one of the sessions of the results */
+    double soc;                     /**< at the beginning */
+    double current_A;               /**< the mean */
+    const taper_outlook_t *outlook; /**< NULL: none was told */
+} sim_connector_row_t;
+
+void sim_results_connector(sim_results_t *results, const sim_connector_row_t *row);
 
 /**
  * Write summary.json, sessions.csv, steps.csv and connectors.csv to a directory, which is made if it does not exist.

@@ -18,6 +18,7 @@ enum {
     COLUMN_MAX_POWER,
     COLUMN_TAPER,
     COLUMN_TOLD,
+    COLUMN_PHASES,
     COLUMN_COUNT
 };
 
@@ -27,6 +28,7 @@ static const sim_column_t columns[COLUMN_COUNT] = {
     [COLUMN_BATTERY] = {"battery_kwh", true},   [COLUMN_SOC_ARRIVAL] = {"soc_arrival", true},
     [COLUMN_SOC_TARGET] = {"soc_target", true}, [COLUMN_MAX_POWER] = {"max_kw", true},
     [COLUMN_TAPER] = {"taper_kw", true},        [COLUMN_TOLD] = {"expected_departure_s", false},
+    [COLUMN_PHASES] = {"phases", false},
 };
 
 /** Times are carried in TIME_SYNC as 32-bit seconds; a time from 1970 on fits. */
@@ -139,13 +141,28 @@ static bool read_vehicle(const row_t *row, sim_session_t *session) {
            sim_table_error(row->table, row->row, row->index[COLUMN_TAPER], "above max_kw");
 }
 
+static bool read_phases(const row_t *row, uint8_t *phases) {
+    const size_t column = row->index[COLUMN_PHASES];
+    const char *cell = column == SIM_NO_COLUMN ? "" : sim_table_cell(row->table, row->row, column);
+    unsigned count = 0;
+    *phases = 0;
+    if (cell[0] == '\0') {
+        return true;
+    }
+    if (!parse_whole(cell, &count) || (count != 1 && count != 3)) {
+        return sim_table_error(row->table, row->row, column, "neither 1 nor 3: '%s'", cell);
+    }
+    *phases = (uint8_t)count;
+    return true;
+}
+
 static bool read_session(const row_t *row, sim_session_t *session) {
     const char *id = sim_table_cell(row->table, row->row, row->index[COLUMN_ID]);
     if (id[0] == '\0') {
         return sim_table_error(row->table, row->row, row->index[COLUMN_ID], "empty");
     }
     if (!read_connector(row, &session->connector) || !read_times(row, session) ||
-        !read_vehicle(row, session)) {
+        !read_vehicle(row, session) || !read_phases(row, &session->phases)) {
         return false;
     }
     session->id = sim_copy(id);

@@ -4,6 +4,7 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 
 /** One visit of one vehicle. Its maximum power is max_kw - taper_kw * SOC, never below 0. */
 typedef struct {
@@ -17,6 +18,7 @@ typedef struct {
     double soc_target;  /**< soc_arrival..1 */
     double max_kw;
     double taper_kw; /**< 0..max_kw */
+    uint8_t phases;  /**< that its charger uses, 1 or 3; 0: all that the connector has */
 } sim_session_t;
 
 typedef struct {

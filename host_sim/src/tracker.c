@@ -3,28 +3,6 @@
 #include <math.h>
 #include <string.h>
 
-/** Power above a limit by less than this is rounding of doubles [kW]. */
-#define LIMIT_TOLERANCE_KW 1e-6
-
-double sim_groups_excess_kw(const taper_station_config_t *station, const double *kw, double limit_kw,
-                            double *group_kw) {
-    for (unsigned g = 0; g < station->group_count; g++) {
-        group_kw[g] = 0.0;
-    }
-    for (unsigned i = 0; i < station->connector_count; i++) {
-        group_kw[station->connectors[i].group] += kw[i];
-    }
-    double excess_kw = 0.0;
-    for (unsigned g = station->group_count; g-- > 0;) { // a parent stands before its children
-        excess_kw = fmax(excess_kw, group_kw[g] - (double)station->groups[g].limit_W / 1000.0);
-        if (g > 0) {
-            group_kw[station->groups[g].parent] += group_kw[g];
-        }
-    }
-    excess_kw = fmax(excess_kw, group_kw[0] - limit_kw);
-    return excess_kw > LIMIT_TOLERANCE_KW ? excess_kw : 0.0;
-}
-
 void sim_tracker_init(sim_tracker_t *tracker, const taper_station_config_t *station, uint32_t grace_ms) {
     *tracker = (sim_tracker_t){.station = station, .grace_ms = grace_ms};
 }
@@ -64,17 +42,17 @@ static void note(sim_excess_t *excess, uint64_t now_ms, uint64_t passed_ms, doub
     excess->worst_kw = fmax(excess->worst_kw, by_kw);
 }
 
-void sim_tracker_look(sim_tracker_t *tracker, uint64_t now_ms, double limit_kw, const double *drawn_kw,
-                      const double *may_kw) {
-    double group_kw[TAPER_MAX_GROUPS] = {0};
+void sim_tracker_look(sim_tracker_t *tracker, uint64_t now_ms, double limit_kw, const sim_load_t *drawn,
+                      const sim_load_t *may) {
+    sim_load_t group[TAPER_MAX_GROUPS];
     const uint64_t passed_ms = tracker->started ? now_ms - tracker->last_ms : 0;
     update_limit(tracker, now_ms, limit_kw);
     note(&tracker->drawn, now_ms, passed_ms,
-         sim_groups_excess_kw(tracker->station, drawn_kw, tracker->limit_kw, group_kw));
-    tracker->drawn_kw = group_kw[0];
+         sim_loads_check(tracker->station, drawn, tracker->limit_kw, group).by_kw);
+    tracker->drawn_kw = group[0].kw;
     note(&tracker->may, now_ms, passed_ms,
-         sim_groups_excess_kw(tracker->station, may_kw, tracker->limit_kw, group_kw));
-    tracker->may_kw = group_kw[0];
+         sim_loads_check(tracker->station, may, tracker->limit_kw, group).by_kw);
+    tracker->may_kw = group[0].kw;
     tracker->last_ms = now_ms;
     tracker->started = true;
 }

@@ -1,22 +1,15 @@
-/** Holds what the connectors draw, and what they may draw, against the limits in force. */
+/** Holds what the connectors draw, and what they may draw, against the limits of power and phases in force. */
 #ifndef SIM_TRACKER_H
 #define SIM_TRACKER_H
 
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "loads.h"
 #include "taper/types.h"
 
 /** Falls of the limit within one time of grace that are told apart; of more, the oldest are given no grace. */
 #define SIM_FALLS_KEPT 32u
-
-/**
- * Most by which a group of the feeder tree is above its limit, group 0 above `limit_kw` too [kW]; 0: none is. Less than
- * a milliwatt is rounding of doubles and does not count. `kw[connector_count]` is per connector; `group_kw[group_count]`
- * receives the sums.
- */
-double sim_groups_excess_kw(const taper_station_config_t *station, const double *kw, double limit_kw,
-                            double *group_kw);
 
 /** How often and how long one kind of sum was above a limit. */
 typedef struct {
@@ -24,7 +17,7 @@ typedef struct {
     uint32_t times;    /**< from first above to below again is once */
     uint64_t ms;       /**< in all */
     uint64_t first_ms; /**< when it was first so, if times > 0 */
-    double worst_kw;
+    double worst_kw;   /**< amperes above a limit as power, see sim_breach_t */
 } sim_excess_t;
 
 typedef struct {
@@ -49,10 +42,11 @@ typedef struct {
 void sim_tracker_init(sim_tracker_t *tracker, const taper_station_config_t *station, uint32_t grace_ms);
 
 /**
- * At `now_ms` (never falling) `limit_kw` is in force for the site, and per connector [connector_count] `drawn_kw` is
- * drawn and `may_kw` is allowed. The limits of the groups are the station's, without grace.
+ * At `now_ms` (never falling) `limit_kw` is in force for the site, and per connector [connector_count] `drawn` is drawn and
+ * `may` is allowed. The limits of groups and phases are the station's, without grace. Imbalance is not held against its
+ * limit: setpoints of one tick reach their connectors one after the other.
  */
-void sim_tracker_look(sim_tracker_t *tracker, uint64_t now_ms, double limit_kw, const double *drawn_kw,
-                      const double *may_kw);
+void sim_tracker_look(sim_tracker_t *tracker, uint64_t now_ms, double limit_kw, const sim_load_t *drawn,
+                      const sim_load_t *may);
 
 #endif

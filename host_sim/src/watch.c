@@ -35,10 +35,29 @@ static void take_status(sim_watch_t *watch, const taper_ctrl_status_t *status) {
     watch->fallback_reports += falls_back ? 1 : 0;
 }
 
+static void take_outlook(sim_watch_t *watch, const taper_frame_t *frame) {
+    const unsigned node = frame->id & 0x3FU;
+    taper_message_t message;
+    if (frame->bus >= SIM_WATCH_BUSES || node < 1 || node > TAPER_NODES_PER_BUS) {
+        return;
+    }
+    sim_watched_t *watched = &watch->node[frame->bus][node];
+    if (read(&watched->check, frame, &message)) {
+        watched->told = true;
+        watched->outlook = message.as.outlook;
+    }
+}
+
+const taper_outlook_t *sim_watch_outlook(const sim_watch_t *watch, unsigned bus, unsigned node) {
+    const sim_watched_t *watched = &watch->node[bus][node];
+    return watched->told ? &watched->outlook : NULL;
+}
+
 void sim_watch_take(sim_watch_t *watch, const taper_frame_t *frame) {
     taper_message_t message;
     switch (frame->id >> 6) {
     case TAPER_MESSAGE_SETPOINT: take_setpoint(watch, frame); break;
+    case TAPER_MESSAGE_OUTLOOK: take_outlook(watch, frame); break;
     case TAPER_MESSAGE_CTRL_STATUS:
         if (frame->bus == 0 && read(&watch->status_check, frame, &message)) {
             take_status(watch, &message.as.ctrl_status);

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "account.h"
 #include "curve.h"
 #include "fleet.h"
 #include "gateway.h"
@@ -13,10 +14,13 @@
 #include "queue.h"
 #include "setup.h"
 #include "taper/membus.h"
-#include "tracker.h"
 
-/** A decrease pays for an increase in the next round; more than a few are not needed. */
-#define HAND_OVER_ROUNDS 6
+/** Connectors echo their first setpoints this long after the tick began [ms]. */
+#define ECHO_ms TAPER_EVSE_STATUS_CYCLE_ms
+/** Then they report, and the station is polled, this often: well within every timeout of the bus. */
+#define ROUND_ms 800u
+/** A hand-over that did not get through so long after the slowest vehicle has reacted goes on in the next tick. */
+#define PATIENCE_ms 1000u
 /** The longest curve takes some 1000. */
 #define CURVE_ROUNDS 5000
 
@@ -35,10 +39,11 @@ typedef struct {
     sim_curve_t curve;
     uint32_t curve_ms; /**< its clock, which counts rounds */
     sim_queue_t queue;
+    sim_account_t account;
+    uint32_t reaction_ms;                   /**< of the slowest vehicle */
     uint64_t random;                        /**< state of next_random() */
     uint8_t turn[TAPER_MAX_CONNECTORS + 1]; /**< nodes in the order of sending; the last is the gateway */
-    double group_kw[TAPER_MAX_GROUPS];
-    uint32_t plans; /**< of the station, seen so far */
+    uint32_t plans;                         /**< of the station, seen so far */
 } world_t;
 
 /** The splitmix64 generator. */
@@ -89,31 +94,6 @@ static bool send_reports(world_t *world, int64_t now_s) {
     return sent && world->bus.to_station.overflows == 0;
 }
 
-/** The vehicles take what they may, and it is all written down. */
-static void draw_power(world_t *world, int64_t now_s) {
-    sim_results_t *results = world->results;
-    double connector_kw[TAPER_MAX_CONNECTORS];
-    unsigned active = 0;
-    for (unsigned i = 0; i < world->run->station->connector_count; i++) {
-        const sim_evse_t *evse = &world->fleet.evse[i];
-        sim_fleet_draw(&world->fleet, i, (double)now_s);
-        connector_kw[i] = evse->power_kw;
-        if (evse->vehicle != NULL) {
-            active += sim_evse_wants(evse) ? 1 : 0;
-            sim_results_connector(results, now_s, i, evse);
-        }
-    }
-    const double limit_kw = sim_gateway_limit_kw(&world->gateway, now_s);
-    const double excess_kw =
-        sim_groups_excess_kw(world->run->station, connector_kw, limit_kw, world->group_kw);
-    results->violation_ticks += excess_kw > 0.0 ? 1 : 0;
-    sim_results_step(results, now_s, limit_kw, world->group_kw[0], active,
-                     taper_station_mode(&world->station));
-    for (unsigned i = 0; i < world->run->station->connector_count; i++) {
-        sim_fleet_charge(&world->fleet, i, (double)now_s);
-    }
-}
-
 /** Take note of a solve that the station finished in this tick. */
 static void note_solve(world_t *world) {
     const taper_station_t *station = &world->station;
@@ -130,18 +110,45 @@ static void note_solve(world_t *world) {
     }
 }
 
-/**
- * What one connector gives up reaches another: setpoints out, echoes in, until nobody waits any more. On a real bus that
- * takes less than a second; here no time passes.
- */
-static bool hand_over(world_t *world, uint32_t now_ms) {
+/** All report again at `passed_ms` into the tick. In every second round the vehicles and the gateway do so too. */
+static bool repeat_reports(world_t *world, int64_t now_s, uint32_t passed_ms, bool whole) {
     bool sent = true;
-    for (unsigned round = 0; round < HAND_OVER_ROUNDS && taper_station_hands_over(&world->station); round++) {
-        for (unsigned i = 0; i < world->run->station->connector_count; i++) {
-            sent = sim_fleet_echo(&world->fleet, i) && sent;
-        }
+    for (unsigned i = 0; i < world->run->station->connector_count; i++) {
+        sent = sim_fleet_echo(&world->fleet, i, whole) && sent;
+    }
+    return (!whole || sim_gateway_repeat(&world->gateway, now_s, (double)passed_ms / 1000.0)) && sent &&
+           world->bus.to_station.overflows == 0;
+}
+
+/** The time of the next round of a hand-over. One of them is that at which the slowest vehicle has just reacted. */
+static uint32_t next_round_ms(const world_t *world, uint32_t passed_ms) {
+    const uint32_t reacted_ms = ECHO_ms + world->reaction_ms;
+    if (passed_ms == 0) {
+        return ECHO_ms;
+    }
+    return passed_ms < reacted_ms && passed_ms + ROUND_ms > reacted_ms ? reacted_ms : passed_ms + ROUND_ms;
+}
+
+/**
+ * What one connector gives up reaches another: echoes in, time passes until the vehicle is known to have followed,
+ * setpoints out; until nobody waits any more, or the tick ends.
+ */
+static bool hand_over(world_t *world, int64_t now_s) {
+    const uint32_t end_ms = world->reaction_ms + PATIENCE_ms;
+    const uint32_t tick_ms = world->run->station->tick_ms;
+    uint32_t passed_ms = next_round_ms(world, 0);
+    bool sent = true;
+    for (unsigned round = 1;
+         sent && passed_ms <= end_ms && passed_ms < tick_ms && taper_station_hands_over(&world->station);
+         round++) {
+        const uint32_t now_ms = (uint32_t)((uint64_t)now_s * 1000U) + passed_ms;
+        sim_account_pass(&world->account, (double)now_s + (double)passed_ms / 1000.0);
+        taper_membus_set_time(&world->bus, now_ms);
+        sent = repeat_reports(world, now_s, passed_ms, round % 2 == 0);
         taper_station_poll(&world->station, now_ms);
         sim_fleet_hear(&world->fleet);
+        sim_account_obey(&world->account);
+        passed_ms = next_round_ms(world, passed_ms);
     }
     return sent;
 }
@@ -176,25 +183,30 @@ static bool tell_curve(world_t *world, int64_t now_s, uint32_t now_ms) {
     return sim_curve_is_settled(&world->curve, (double)now_s);
 }
 
+/** @return false */
+static bool bus_failed(int64_t now_s) {
+    fprintf(stderr, "taper-sim: internal error at %lld s: the station or the bus refused what it was sent\n",
+            (long long)now_s);
+    return false;
+}
+
 static bool run_tick(world_t *world, int64_t now_s) {
     const uint32_t now_ms = (uint32_t)((uint64_t)now_s * 1000U);
     taper_membus_set_time(&world->bus, now_ms);
     sim_queue_advance(&world->queue, now_s);
     const bool reported = send_reports(world, now_s);
-    sim_fleet_begin(&world->fleet);
+    sim_fleet_begin(&world->fleet, now_s);
     if (!reported || !tell_curve(world, now_s, now_ms)) {
-        fprintf(stderr,
-                "taper-sim: internal error at %lld s: the station or the bus refused what it was sent\n",
-                (long long)now_s);
-        return false;
+        return bus_failed(now_s);
     }
     taper_station_step(&world->station, now_ms);
     note_solve(world);
     sim_fleet_hear(&world->fleet);
-    if (!hand_over(world, now_ms)) {
-        return false;
+    sim_account_begin(&world->account, now_s, sim_gateway_limit_kw(&world->gateway, now_s));
+    if (!hand_over(world, now_s)) {
+        return bus_failed(now_s);
     }
-    draw_power(world, now_s);
+    sim_account_end(&world->account, &world->station);
     return true;
 }
 
@@ -228,13 +240,19 @@ bool sim_world_run(const sim_case_t *run, sim_results_t *results) {
     for (unsigned i = 0; i <= run->station->connector_count; i++) {
         world->turn[i] = (uint8_t)i;
     }
+    for (unsigned i = 0; i < run->station->connector_count; i++) {
+        const uint32_t reaction_ms = run->station->connectors[i].reaction_ms;
+        world->reaction_ms = reaction_ms > world->reaction_ms ? reaction_ms : world->reaction_ms;
+    }
     taper_membus_init(&world->bus);
     world->world_port = taper_membus_world_port(&world->bus);
     sim_fleet_init(&world->fleet, run->station, &world->world_port, run->policy->tells_taper, run->seed);
     sim_gateway_init(&world->gateway, run->limits, &world->world_port, world->tick_s, run->seed);
     sim_curve_init(&world->curve, run->limits);
+    sim_curve_set_prices(&world->curve, run->prices);
     sim_queue_init(&world->queue, run->sessions, world->fleet.evse, run->station->connector_count,
                    results->outcome);
+    world->account = (sim_account_t){.fleet = &world->fleet, .prices = run->prices, .results = results};
     bool good = init_station(world);
     if (good) {
         if (run->problems != NULL) {

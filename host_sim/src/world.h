@@ -18,7 +18,8 @@ typedef struct {
     const taper_solver_t *solver;          /**< NULL: none was built in */
     const sim_policy_t *policy;
     const sim_sessions_t *sessions;
-    const sim_limits_t *limits; /**< nowhere above the station's own site limit */
+    const sim_course_t *limits; /**< nowhere above the station's own site limit */
+    const sim_course_t *prices; /**< of energy, per kWh; NULL: none */
     uint64_t seed;              /**< decides in which order nodes send, and nothing else */
     FILE *problems;             /**< where the planning problems go; NULL: nowhere */
 } sim_case_t;

@@ -24,6 +24,8 @@ def parse():
     parser.add_argument("--station", choices=CONNECTORS, required=True)
     parser.add_argument("--limit-kw", type=float, required=True)
     parser.add_argument("--tick-s", type=float, required=True)
+    parser.add_argument("--price-csv")
+    parser.add_argument("--price-weight", type=float)
     return parser.parse_args()
 
 
@@ -80,7 +82,8 @@ def main():
         "requested_kwh": sum(car["energy"] + car["short"] for car in cars),
         "delivered_kwh": sum(car["energy"] for car in cars), "satisfied": sum(satisfied), "limit_violations": 0,
         "fallback_ticks": 0, "solves": solves, "iterations": some, "solve_ms": some,
-        "peak_kw": max(step[2] for step in steps)}))
+        "peak_kw": max(step[2] for step in steps),
+        "energy_cost": 0.2 * sum(car["energy"] for car in cars) if options.price_csv else None}))
     write_csv(out / "sessions.csv",
               ["session_id", "connector", "energy_kwh", "soc_departure", "satisfied", "short_kwh", "queued_s"],
               [[car["session_id"], 0, car["energy"], car["soc"], int(good), car["short"], 0]

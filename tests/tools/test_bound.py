@@ -4,16 +4,43 @@ import bound as bound_tool
 import numpy as np
 import pytest
 from taperlib.clairvoyant import clairvoyant_bound
+from taperlib.feeders import feeder_rows
 from taperlib.files import InputError
 from taperlib.limits import Limit, constant_limit, read_limit_csv
 from taperlib.sessions import Session, read_sessions_csv, write_sessions_csv
 
 HOUR_S = 3600
 PLENTY = constant_limit(1000.0)
+FUSED = """
+name = "fused"
+description = "Four three-phase sockets below one fuse"
+[horizon]
+steps = 4
+step_s = 900
+[control]
+tick_ms = 1000
+min_on_s = 0
+min_off_s = 0
+[site]
+failsafe_kW = 5.0
+[[groups]]
+name = "site"
+limit_kW = 100.0
+limit_A = 40.0
+[[connectors]]
+count = 4
+group = "site"
+kind = "AC"
+phases = 3
+voltage_V = 230
+min_A = 6.0
+max_A = 32.0
+"""
 
 
-def car(arrival_h=0.0, departure_h=1.0, battery_kwh=20.0, soc=0.0, target=1.0, max_kw=8.0, taper_kw=0.0, name="car"):
-    return Session(name, arrival_h * HOUR_S, departure_h * HOUR_S, battery_kwh, soc, target, max_kw, taper_kw)
+def car(arrival_h=0.0, departure_h=1.0, battery_kwh=20.0, soc=0.0, target=1.0, max_kw=8.0, taper_kw=0.0, name="car",
+        **optional):
+    return Session(name, arrival_h * HOUR_S, departure_h * HOUR_S, battery_kwh, soc, target, max_kw, taper_kw, **optional)
 
 
 def energy_by_recursion(session, tick_s):
@@ -101,6 +128,59 @@ def test_the_first_limit_also_holds_before_its_time(tmp_path):
     assert limit.mean_kw(np.array([0.0, 900.0, 10800.0])).tolist() == pytest.approx([4.0, (6300 * 4 + 3600) / 9900])
 
 
+# ---- The feeder tree: caltech has pods of 80 A on connectors 1-8 and 9-16, all between L1 and L2 at 208 V
+
+def at_caltech(count, first=1, named=True, max_kw=6.656):
+    return [car(name=f"car-{number}", max_kw=max_kw, connector=str(number) if named else "")
+            for number in range(first, first + count)]
+
+
+def feeder_bound_kwh(sessions, station="caltech"):
+    return bound_kwh(sessions, feeders=feeder_rows(station, sessions))
+
+
+def test_a_feeder_bounds_the_sessions_that_name_its_connectors():
+    eight = at_caltech(8)  # 32 A each, of which the pod has 80
+    assert bound_kwh(eight) == pytest.approx(8 * 6.656)
+    assert feeder_bound_kwh(eight) == pytest.approx(80 * 0.208)
+
+
+def test_two_feeders_bound_their_own_sessions_only():
+    assert feeder_bound_kwh(at_caltech(16)) == pytest.approx(2 * 80 * 0.208)
+    assert feeder_bound_kwh(at_caltech(18)) == pytest.approx(2 * 80 * 0.208 + 2 * 6.656)
+
+
+def test_a_session_without_a_connector_is_not_bound_by_feeders():
+    assert feeder_bound_kwh(at_caltech(8, named=False)) == pytest.approx(8 * 6.656)
+
+
+def test_the_station_s_own_limit_bounds_sessions_without_a_connector_too():
+    assert feeder_bound_kwh(at_caltech(40, named=False)) == pytest.approx(150.0)
+
+
+def test_a_one_phase_car_loads_its_own_phase_only(tmp_path, monkeypatch):
+    """Four three-phase sockets below a fuse of 40 A: one-phase cars draw from the first phase, and all of them from it."""
+    folder = tmp_path / "codegen" / "stations"
+    folder.mkdir(parents=True)
+    (folder / "fused.toml").write_text(FUSED)
+    monkeypatch.setattr("taperlib.feeders.station_file", lambda name: folder / f"{name}.toml")
+    one = [car(name=f"{number}", max_kw=7.36, connector=str(number), phases=1) for number in (1, 2)]
+    three = [car(name=f"{number}", max_kw=22.08, battery_kwh=60.0, connector=str(number)) for number in (3, 4)]
+    assert feeder_bound_kwh(one, "fused") == pytest.approx(40 * 0.23)
+    assert feeder_bound_kwh(three, "fused") == pytest.approx(40 * 0.69)
+    assert feeder_bound_kwh(one + three, "fused") == pytest.approx(40 * 0.69)
+
+
+def test_a_connector_that_the_station_lacks_is_an_error():
+    with pytest.raises(InputError, match="station caltech has no connector 55"):
+        feeder_rows("caltech", at_caltech(1, first=55))
+
+
+def test_a_station_that_is_not_there_is_an_error():
+    with pytest.raises(InputError, match="station nowhere"):
+        feeder_rows("nowhere", at_caltech(1))
+
+
 def test_a_step_too_long_for_the_taper_is_refused():
     with pytest.raises(InputError, match="too long for the steepest taper"):
         clairvoyant_bound([car(battery_kwh=1.0, taper_kw=8.0)], PLENTY, step_s=3600)
@@ -114,6 +194,16 @@ def test_sessions_survive_writing_and_reading_in_any_column_order(tmp_path):
     path.write_text("taper_kw,max_kw,soc_target,soc_arrival,battery_kwh,departure_s,arrival_s,connector,session_id\n"
                     "4.32,7.2,0.9,0.123456,64,900,0.5,3,z\n")
     assert read_sessions_csv(path) == [Session("z", 0.5, 900, 64, 0.123456, 0.9, 7.2, 4.32, connector="3")]
+
+
+def test_phases_survive_writing_and_reading(tmp_path):
+    path = tmp_path / "sessions.csv"
+    sessions = [car(name="a", phases=1), car(name="b")]
+    write_sessions_csv(path, sessions)
+    assert read_sessions_csv(path) == sessions
+    path.write_text(path.read_text().replace(",1\n", ",2\n"))
+    with pytest.raises(InputError, match="column phases: 2 is neither 1 nor 3"):
+        read_sessions_csv(path)
 
 
 @pytest.mark.parametrize("column, value, reason", [

@@ -60,6 +60,25 @@ def test_the_table_keeps_the_order_asked_for_and_measures_against_the_bound(case
         assert float(row["unserved_kwh"]) == pytest.approx(3 * 16 - float(row["energy_kwh"]))
 
 
+def test_energy_without_a_price_has_no_cost(case):
+    folder, arguments = case
+    assert main(arguments) == 0
+    assert {row["cost"] for row in table_of(folder)} == {""}
+    assert "per kWh" not in (folder / "out" / "report.html").read_text().split("<tbody>")[0].split("<thead>")[1]
+
+
+def test_prices_go_to_the_simulator_and_costs_into_the_table(case):
+    folder, arguments = case
+    prices = folder / "day-ahead.csv"
+    prices.write_text("time_s,price_per_kwh\n0,0.2\n")
+    assert main([*arguments, "--price-csv", str(prices), "--price-weight", "0.5"]) == 0
+    for row in table_of(folder):
+        assert float(row["cost"]) == pytest.approx(0.2 * float(row["energy_kwh"]))
+        assert float(row["cost_per_kwh"]) == pytest.approx(0.2)
+    report = (folder / "out" / "report.html").read_text()
+    assert "price day-ahead.csv with weight 0.5" in report and "<span>per kWh</span>" in report
+
+
 def test_a_policy_that_solves_nothing_has_no_iterations(case):
     folder, arguments = case
     assert main(arguments) == 0

@@ -3,9 +3,9 @@
 import pytest
 from monitor_bench import (
     DIAG_CRC_ERRORS, DIAG_PLANS, EVENT_CONNECTOR_LOST, GATEWAY, MODE_FAILSAFE, NOON_UNIX_S, REASON_HAND_OVER,
-    SOURCE_FAILSAFE, Scene)
+    REASON_SITE_LIMIT, REASON_WAITING, SOURCE_FAILSAFE, Scene)
 from taperlib.canbus import Frame, Receiver, checksum, protect
-from taperlib.station_screen import columns_for
+from taperlib.station_screen import columns_for, ordinal
 
 # ---- The bus
 
@@ -114,15 +114,46 @@ def test_a_vehicle_that_left_is_forgotten(scene):
 
 
 def test_the_controller_s_reason_is_shown_in_words(scene):
-    scene.send("PLAN", 2, reason=REASON_HAND_OVER, power_0=4200, power_1=0, power_2=0)
+    scene.send("PLAN", 2, power_0=4200, power_1=0, power_2=0)
+    scene.send("OUTLOOK", 2, reason=REASON_HAND_OVER)
     row = scene.row(2)
     assert (row.reason, row.reason_told, row.planned_kw) == ("hand over", True, 4.2)
+
+
+def test_what_the_driver_can_expect_is_shown(scene):
+    scene.send("OUTLOOK", 2, reason=REASON_WAITING, waiting_place=2, waiting_of=3, soc_estimated=1, soc_at_departure=61.5,
+               short_energy=11_100, because=REASON_SITE_LIMIT)
+    row = scene.row(2)
+    assert (row.reason, row.waiting_place, row.waiting_of) == ("waiting", 2, 3)
+    assert (row.expected_soc_percent, row.short_kwh, row.because) == (61.5, 11.1, "site limit")
+    line = next(line for line in scene.drawn(160).splitlines() if line.lstrip().startswith("2 "))
+    for part in ("~48%", "62%", "11.1", "waiting, 2nd of 3"):
+        assert part in line
+
+
+def test_nothing_is_expected_where_nothing_is_known(scene):
+    scene.send("OUTLOOK", 1, reason=REASON_SITE_LIMIT, soc_at_departure=127.5, short_energy=655_350)
+    row = scene.row(1)
+    assert (row.reason, row.reason_told) == ("site limit", True)
+    assert (row.waiting_place, row.expected_soc_percent, row.short_kwh, row.because) == (None, None, None, None)
+
+
+def test_an_outlook_goes_with_its_vehicle(scene):
+    scene.send("OUTLOOK", 2, reason=REASON_WAITING, waiting_place=1, waiting_of=1)
+    scene.status(2, pilot_state=0, ev_present=0)
+    scene.status(2)
+    assert (scene.row(2).reason, scene.row(2).waiting_place) == ("no parameters", None)
+
+
+@pytest.mark.parametrize(("place", "text"), [(1, "1st"), (2, "2nd"), (3, "3rd"), (4, "4th"), (11, "11th"), (13, "13th")])
+def test_places_are_ordinals(place, text):
+    assert ordinal(place) == text
 
 
 @pytest.mark.parametrize(("values", "reason"), [
     ({"complete": 1}, "complete"), ({"pause_requested": 1}, "vehicle pause"), ({"error": 3}, "fault"),
     ({"max_current": 16}, "vehicle limit"), ({}, "planned")])
-def test_without_a_plan_the_reason_is_inferred(scene, values, reason):
+def test_without_an_outlook_the_reason_is_inferred(scene, values, reason):
     scene.send("EV_STATUS", 1, **{"soc": 47.5, "max_current": 32} | values)
     row = scene.row()
     assert (row.reason, row.reason_told) == (reason, False)
@@ -199,7 +230,7 @@ def test_eighty_columns_hold_the_table(scene):
 def test_wide_terminals_show_every_column_and_narrow_ones_the_essential():
     assert [column.heading for column in columns_for(160)] == [
         "n", "state", "ses", "SOC", "age s", "to", "need", "until", "set A", "left s", "echo", "is A", "kW", "plan",
-        "kWh", "why"]
+        "kWh", "will", "short", "why"]
     assert [column.heading for column in columns_for(30)] == ["n", "state", "why"]
 
 

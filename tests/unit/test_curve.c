@@ -12,11 +12,11 @@
 
 static double time_s[MANY];
 static double limit_kw[MANY];
-static sim_limits_t limits;
+static sim_course_t limits;
 static taper_membus_injector_t injector;
 
 void setUp(void) {
-    limits = (sim_limits_t){.time_s = time_s, .limit_kw = limit_kw, .count = 0};
+    limits = (sim_course_t){.time_s = time_s, .value = limit_kw, .count = 0};
 }
 
 void tearDown(void) {

@@ -162,7 +162,7 @@ static void test_the_clock_tells_the_time_of_the_world(void) {
 static void test_a_change_of_the_limit_is_told_at_once(void) {
     double time_s[] = {0.0, WORLD_START_S + 5.32};
     double limit_kw[] = {50.0, 20.0};
-    const sim_limits_t limits = {.time_s = time_s, .limit_kw = limit_kw, .count = 2};
+    const sim_course_t limits = {.time_s = time_s, .value = limit_kw, .count = 2};
     sim_field_options_t options = field_options();
     options.limits = &limits;
     const sim_session_t sessions[] = {field_vehicle(0.0)};
@@ -186,7 +186,7 @@ static void test_a_gateway_without_a_limit_is_alive_only(void) {
 static void test_a_dead_gateway_leaves_the_failsafe_limit_behind(void) {
     double time_s = 0.0;
     double limit_kw = 50.0;
-    const sim_limits_t limits = {.time_s = &time_s, .limit_kw = &limit_kw, .count = 1};
+    const sim_course_t limits = {.time_s = &time_s, .value = &limit_kw, .count = 1};
     sim_field_options_t options = field_options();
     options.limits = &limits;
     const sim_session_t sessions[] = {field_vehicle(0.0)};

@@ -338,6 +338,18 @@ static void test_a_delta_line_that_is_above_its_limit_by_one_pair_gets_no_more_o
     TEST_ASSERT_TRUE(passes());
 }
 
+static void test_what_is_granted_tilts_no_group_though_others_are_held_back(void) {
+    const uint8_t rank[CONNECTORS] = {0, 1, 2, 3, 4, 5};
+    const taper_setpoints_t target = {{16000, 16000}};
+    connectors[1].rotation = connectors[2].rotation = TAPER_ROTATION_231;
+    groups[1].limit_mA = 20000;
+    groups[1].imbalance_mA = 10000;
+    may_draw(2, 20000); /* leaves the other nothing on its phase */
+    taper_ledger_grant(&ledger, &config, &snapshot, rank, &supply, &target, &granted);
+    TEST_ASSERT_EQUAL_INT32(10000, granted.current_mA[0]);
+    TEST_ASSERT_EQUAL_INT32(0, granted.current_mA[1]);
+}
+
 /** Random trees, wirings, ledgers and targets: the guard passes whatever is granted, and knows what is one step too much. */
 static void test_the_guard_agrees_with_what_is_granted(void) {
     uint32_t state = 0x9a4d;
@@ -403,6 +415,7 @@ int main(void) {
     RUN_TEST(test_what_may_be_drawn_already_may_stay_and_not_grow);
     RUN_TEST(test_decreases_count_when_they_are_proven);
     RUN_TEST(test_a_delta_line_that_is_above_its_limit_by_one_pair_gets_no_more_of_another);
+    RUN_TEST(test_what_is_granted_tilts_no_group_though_others_are_held_back);
     RUN_TEST(test_the_guard_agrees_with_what_is_granted);
     return UNITY_END();
 }

@@ -388,6 +388,25 @@ static void test_a_report_of_fallback_keeps_the_highest_that_may_be_meant(void) 
     TEST_ASSERT_EQUAL_INT32(10000, fallback_mA());
 }
 
+static void test_who_ran_out_of_setpoints_is_out_of_reach_until_it_is_heard_to_accept_one(void) {
+    send(0, 16000, 6000);
+    wait_ms(EXPIRED_ms - 1);
+    TEST_ASSERT_EQUAL_INT32(0, taper_ledger_unreached_mA(&ledger, 0));
+    wait_ms(1);
+    TEST_ASSERT_EQUAL_INT32(6000, taper_ledger_unreached_mA(&ledger, 0));
+    TEST_ASSERT_EQUAL_INT32(0, taper_ledger_unreached_mA(&ledger, 1));
+    send(1, 8000, 8000);
+    TEST_ASSERT_EQUAL_INT32(6000, taper_ledger_unreached_mA(&ledger, 0));
+    hear_echo(1);
+    TEST_ASSERT_EQUAL_INT32(0, taper_ledger_unreached_mA(&ledger, 0));
+}
+
+static void test_after_a_start_nobody_is_known_to_be_within_reach(void) {
+    connectors[0].fallback_mA = 7000;
+    start(1);
+    TEST_ASSERT_EQUAL_INT32(7000, taper_ledger_unreached_mA(&ledger, 0));
+}
+
 /* An earlier life. */
 
 static void test_after_a_start_its_maximum_counts_until_it_is_left_and_then_its_fallback_current(void) {
@@ -586,6 +605,8 @@ int main(void) {
     RUN_TEST(test_an_echo_of_what_expired_ends_no_fallback_current);
     RUN_TEST(test_a_fallback_current_ends_with_the_vehicle);
     RUN_TEST(test_a_report_of_fallback_keeps_the_highest_that_may_be_meant);
+    RUN_TEST(test_who_ran_out_of_setpoints_is_out_of_reach_until_it_is_heard_to_accept_one);
+    RUN_TEST(test_after_a_start_nobody_is_known_to_be_within_reach);
     RUN_TEST(test_after_a_start_its_maximum_counts_until_it_is_left_and_then_its_fallback_current);
     RUN_TEST(test_after_a_start_fallback_ends_it_sooner_and_only_once);
     RUN_TEST(test_after_a_start_a_late_proof_makes_it_last_no_longer);

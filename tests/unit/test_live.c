@@ -48,7 +48,7 @@ static void test_eight_vehicles_share_a_limit_and_never_exceed_it(void) {
 static void test_a_fall_of_the_limit_is_followed_in_time(void) {
     double time_s[] = {0.0, LIVE_START_S + 30.3, LIVE_START_S + 60.0};
     double limit_kw[] = {60.0, 9.0, 60.0};
-    const sim_limits_t limits = {.time_s = time_s, .limit_kw = limit_kw, .count = 3};
+    const sim_course_t limits = {.time_s = time_s, .value = limit_kw, .count = 3};
     live_options_t options = live_options(-1.0);
     options.limits = &limits;
     start(&options, 8);
@@ -63,7 +63,7 @@ static void test_a_fall_of_the_limit_is_followed_in_time(void) {
 static void test_vehicles_that_do_not_follow_are_seen_to_exceed(void) {
     double time_s[] = {0.0, LIVE_START_S + 30.0};
     double limit_kw[] = {60.0, 9.0};
-    const sim_limits_t limits = {.time_s = time_s, .limit_kw = limit_kw, .count = 2};
+    const sim_course_t limits = {.time_s = time_s, .value = limit_kw, .count = 2};
     live_options_t options = live_options(-1.0);
     options.limits = &limits;
     options.vehicle_delay_ms = 5000;

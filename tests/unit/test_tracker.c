@@ -21,9 +21,14 @@ void tearDown(void) {}
 
 /** Connector 1 draws `power_kw` and may draw `most_kw`. */
 static void look(uint64_t now_ms, double limit_kw, double power_kw, double most_kw) {
-    double may[8] = {most_kw};
+    sim_load_t drawn[8];
+    sim_load_t may[8];
     kw[0] = power_kw;
-    sim_tracker_look(&tracker, now_ms, limit_kw, kw, may);
+    for (unsigned i = 0; i < 8; i++) {
+        drawn[i] = (sim_load_t){.kw = kw[i]};
+        may[i] = (sim_load_t){.kw = i == 0 ? most_kw : 0.0};
+    }
+    sim_tracker_look(&tracker, now_ms, limit_kw, drawn, may);
 }
 
 static void test_power_at_the_limit_is_no_violation(void) {

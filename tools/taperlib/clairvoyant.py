@@ -7,6 +7,7 @@ energy charged since arrival at the end of the step [kWh]:
     x(i,t) = x(i,t-1) + e(i,t),  x(i,-1) = 0,  x(i,t) <= request(i)
     0 <= e(i,t) <= g(i,t) * hours * (max_kw(i) - taper_kw(i) * soc(i))   soc at the start of the step
     sum over i of e(i,t) <= hours * mean limit in the step
+    sum over i of per_kw(k,i) * e(i,t) <= hours * limit(k)               per row k of the feeder tree (feeders.py)
 
 With f the share of the step that the car is there, g is f when the power is held for the step (the paper's model,
 tick_s = step_s). A controller with a shorter tick lets the power fall with the SOC within the step; following the taper
@@ -21,6 +22,7 @@ from dataclasses import dataclass
 import highspy
 import numpy as np
 
+from .feeders import FeederRow
 from .files import InputError
 from .limits import Limit
 from .sessions import Session
@@ -66,16 +68,42 @@ def _taper_gain(present: np.ndarray, drop_per_tick: np.ndarray, ticks_per_step: 
     return present * np.where(drop_per_tick > 0, reduced, 1.0)
 
 
+@dataclass(frozen=True)
+class _Sums:
+    """The rows that sum over sessions: entries in the columns of e, and bounds. Row numbers count from 0."""
+
+    row: np.ndarray
+    cell: np.ndarray
+    value: np.ndarray
+    upper: np.ndarray
+
+
+def _sums(cells: _Cells, limit: Limit, feeders: list[FeederRow], step_s: float) -> _Sums:
+    """The site's limit in every step, then every row of the feeder tree in every step."""
+    hours = step_s / SECONDS_PER_HOUR
+    steps, site_row = np.unique(cells.step, return_inverse=True)
+    limit_kw = limit.mean_kw(np.arange(steps[0], steps[-1] + 2) * step_s)[steps - steps[0]]
+    row, cell, value, upper = [site_row], [np.arange(site_row.size)], [np.ones(site_row.size)], [limit_kw * hours]
+    for index, feeder in enumerate(feeders, start=1):
+        weight = feeder.per_kw[cells.session]
+        counted = np.flatnonzero(weight)
+        row.append(index * steps.size + site_row[counted])
+        cell.append(counted)
+        value.append(weight[counted])
+        upper.append(np.full(steps.size, feeder.limit * hours))
+    return _Sums(*(np.concatenate(part) for part in (row, cell, value, upper)))
+
+
 def _matrix(
-    cells: _Cells, taper_per_kwh: np.ndarray, site_rows: np.ndarray
+    cells: _Cells, taper_per_kwh: np.ndarray, sums: _Sums
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """CSC arrays (start, row, value). Columns: all e, then all x. Rows: balance, taper, site limit."""
+    """CSC arrays (start, row, value). Columns: all e, then all x. Rows: balance, taper, sums."""
     count = cells.session.size
     cell = np.arange(count)
     followed = cell[:-1][~cells.is_first[1:]]
-    rows = [cell, count + cell, 2 * count + site_rows, cell, followed + 1, count + followed + 1]
-    columns = [cell, cell, cell, count + cell, count + followed, count + followed]
-    values = [np.ones(count), np.ones(count), np.ones(count), -np.ones(count), np.ones(followed.size),
+    rows = [cell, count + cell, 2 * count + sums.row, cell, followed + 1, count + followed + 1]
+    columns = [cell, cell, sums.cell, count + cell, count + followed, count + followed]
+    values = [np.ones(count), np.ones(count), sums.value, -np.ones(count), np.ones(followed.size),
               taper_per_kwh[followed + 1]]
     row, column, value = (np.concatenate(part) for part in (rows, columns, values))
     order = np.lexsort((row, column))
@@ -83,7 +111,9 @@ def _matrix(
     return start, row[order], value[order]
 
 
-def _linear_programme(sessions: list[Session], limit: Limit, step_s: float, tick_s: float) -> highspy.HighsLp:
+def _linear_programme(
+    sessions: list[Session], limit: Limit, feeders: list[FeederRow], step_s: float, tick_s: float
+) -> highspy.HighsLp:
     def column(name: str) -> np.ndarray:
         return np.array([getattr(session, name) for session in sessions], dtype=float)
 
@@ -97,29 +127,29 @@ def _linear_programme(sessions: list[Session], limit: Limit, step_s: float, tick
     gain = _taper_gain(cells.present, drop_per_tick[cells.session], step_s / tick_s)
     arrival_kw = max_kw - taper_kw * column("soc_arrival")
 
-    steps, site_rows = np.unique(cells.step, return_inverse=True)
-    limit_of_step_kw = limit.mean_kw(np.arange(steps[0], steps[-1] + 2) * step_s)[steps - steps[0]]
+    sums = _sums(cells, limit, feeders, step_s)
     count = cells.session.size
     lp = highspy.HighsLp()
     lp.num_col_ = 2 * count
-    lp.num_row_ = 2 * count + steps.size
+    lp.num_row_ = 2 * count + sums.upper.size
     lp.sense_ = highspy.ObjSense.kMaximize
     lp.col_cost_ = np.concatenate([np.ones(count), np.zeros(count)])
     lp.col_lower_ = np.zeros(2 * count)
     lp.col_upper_ = np.concatenate([np.full(count, highspy.kHighsInf), column("requested_kwh")[cells.session]])
-    no_bound = np.full(count + steps.size, -highspy.kHighsInf)
+    no_bound = np.full(count + sums.upper.size, -highspy.kHighsInf)
     lp.row_lower_ = np.concatenate([np.zeros(count), no_bound])
     lp.row_upper_ = np.concatenate([
-        np.zeros(count), gain * hours * arrival_kw[cells.session], limit_of_step_kw * hours,
+        np.zeros(count), gain * hours * arrival_kw[cells.session], sums.upper,
     ])
-    start, row, value = _matrix(cells, gain * hours * taper_kw_per_kwh[cells.session], site_rows)
+    start, row, value = _matrix(cells, gain * hours * taper_kw_per_kwh[cells.session], sums)
     lp.a_matrix_.format_ = highspy.MatrixFormat.kColwise
     lp.a_matrix_.start_, lp.a_matrix_.index_, lp.a_matrix_.value_ = start, row, value
     return lp
 
 
 def clairvoyant_bound(
-    sessions: list[Session], limit: Limit, step_s: float = 900.0, tick_s: float | None = None
+    sessions: list[Session], limit: Limit, step_s: float = 900.0, tick_s: float | None = None,
+    feeders: list[FeederRow] | None = None
 ) -> Bound:
     """The bound in kWh. tick_s defaults to step_s, the paper's model.
 
@@ -127,7 +157,7 @@ def clairvoyant_bound(
     day; simplex takes 3.5 s and up to 1.2 s.
     """
     started = time.perf_counter()
-    lp = _linear_programme(sessions, limit, step_s, min(tick_s or step_s, step_s))
+    lp = _linear_programme(sessions, limit, feeders or [], step_s, min(tick_s or step_s, step_s))
     highs = highspy.Highs()
     highs.setOptionValue("output_flag", False)
     highs.setOptionValue("solver", "ipm")

@@ -32,6 +32,8 @@ class Measures:
     iterations_max: float | None
     solve_ms_p50: float | None
     solve_ms_max: float | None
+    cost: float | None
+    cost_per_kwh: float | None
 
 
 def jain_fairness(shares: np.ndarray) -> float:
@@ -89,4 +91,6 @@ def measures_of(sessions: list[Session], run: Run, limit: Limit, bound_kwh: floa
         iterations_max=iterations.max,
         solve_ms_p50=solve_ms.p50,
         solve_ms_max=solve_ms.max,
+        cost=run.cost,
+        cost_per_kwh=None if run.cost is None or run.delivered_kwh == 0 else run.cost / run.delivered_kwh,
     )

@@ -27,7 +27,7 @@ EXIT_NOTHING_HEARD, EXIT_USAGE = 1, 2
 
 DESCRIPTION = """Shows a charging station as its CAN bus shows it: limits, connectors, and why each has the current that
 it has. Only listens, never sends; needs no root. On a terminal the table is live until Ctrl-C; elsewhere it is
-printed once. A reason with a question mark is inferred, because no PLAN frame told it."""
+printed once. A reason with a question mark is inferred, because no OUTLOOK frame told it."""
 EPILOG = "Exit code: 0 good; 1 nothing was heard (--once); 2 wrong usage, or an interface or file that cannot be used."
 
 

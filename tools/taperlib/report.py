@@ -28,6 +28,7 @@ class Comparison:
     station: str
     sessions_file: str
     limit_text: str
+    price_text: str | None
     tick_s: float
     bound_kwh: float
     bound_solve_s: float
@@ -41,7 +42,8 @@ def cell_text(row: Measures, name: str) -> str:
     """A value of the table as people read it; an absent one is a dash."""
     value = getattr(row, name)
     decimals = {"energy_kwh": 1, "share_of_bound_percent": 2, "unserved_kwh": 1, "jain_fairness": 4, "peak_kw": 2,
-                "iterations_p50": 0, "iterations_max": 0, "solve_ms_p50": 3, "solve_ms_max": 3}
+                "iterations_p50": 0, "iterations_max": 0, "solve_ms_p50": 3, "solve_ms_max": 3,
+                "cost": 2, "cost_per_kwh": 4}
     if value is None:
         return "–"
     if name == "satisfied":
@@ -49,14 +51,20 @@ def cell_text(row: Measures, name: str) -> str:
     return f"{value:,.{decimals.get(name, 0)}f}" if isinstance(value, (int, float)) else value
 
 
-# Field of Measures, its heading in the tables, and its unit.
-HEADINGS = (
+Heading = tuple[str, str, str]  # field of Measures, its heading in the tables, and its unit
+COST_HEADINGS: tuple[Heading, ...] = (("cost", "Cost", ""), ("cost_per_kwh", "Cost", "per kWh"))
+HEADINGS: tuple[Heading, ...] = (
     ("policy", "Policy", ""), ("energy_kwh", "Energy", "kWh"), ("share_of_bound_percent", "Of bound", "%"),
     ("satisfied", "Satisfied", ""), ("unserved_kwh", "Unserved", "kWh"), ("jain_fairness", "Jain", ""),
     ("peak_kw", "Peak", "kW"), ("violations", "Violations", ""), ("fallback_ticks", "Fallback", "ticks"),
     ("solves", "Solves", ""), ("iterations_p50", "Iter.", "p50"), ("iterations_max", "Iter.", "max"),
     ("solve_ms_p50", "Solve", "ms p50"), ("solve_ms_max", "Solve", "ms max"),
 )
+
+
+def headings_of(table: list[Measures]) -> tuple[Heading, ...]:
+    """The columns of people's tables: costs only where energy had a price."""
+    return HEADINGS + (COST_HEADINGS if any(row.cost is not None for row in table) else ())
 
 
 def table_csv(table: list[Measures]) -> str:
@@ -76,6 +84,7 @@ def comparison_json(comparison: Comparison) -> str:
         "sessions": len(comparison.sessions),
         "requested_kwh": requested_kwh(comparison.sessions),
         "limit": comparison.limit_text,
+        "price": comparison.price_text,
         "tick_s": comparison.tick_s,
         "bound_kwh": comparison.bound_kwh,
         "bound_solve_s": comparison.bound_solve_s,
@@ -109,7 +118,7 @@ def report_html(comparison: Comparison) -> str:
     return environment.get_template("report.html.j2").render(
         comparison=comparison,
         requested_kwh=requested_kwh(comparison.sessions),
-        headings=HEADINGS,
+        headings=headings_of(comparison.table),
         cell_text=cell_text,
         colour_of=charts.colour_of,
         best_share=max(row.share_of_bound_percent for row in comparison.table),

@@ -1,8 +1,9 @@
 """Charging sessions: the CSV that the simulator replays, read, checked and written.
 
 Columns, in any order: session_id, connector, arrival_s, departure_s, battery_kwh, soc_arrival, soc_target, max_kw,
-taper_kw, and optionally expected_departure_s. Times are seconds from the start of the simulation; SOC is 0 to 1. The
-most that a vehicle takes is max_kw - taper_kw * soc, never below 0. An empty connector means the first free one.
+taper_kw, and optionally expected_departure_s and phases. Times are seconds from the start of the simulation; SOC is 0 to
+1. The most that a vehicle takes is max_kw - taper_kw * soc, never below 0. An empty connector means the first free one,
+empty phases all that the connector has.
 """
 
 import csv
@@ -16,6 +17,7 @@ TEXT_COLUMNS = ("session_id", "connector")
 NUMBER_COLUMNS = ("arrival_s", "departure_s", "battery_kwh", "soc_arrival", "soc_target", "max_kw", "taper_kw")
 COLUMNS = TEXT_COLUMNS + NUMBER_COLUMNS
 EXPECTED_COLUMN = "expected_departure_s"
+PHASES_COLUMN = "phases"
 
 
 @dataclass(frozen=True)
@@ -30,6 +32,7 @@ class Session:
     taper_kw: float
     connector: str = ""
     expected_departure_s: float | None = None
+    phases: int | None = None
 
     @property
     def requested_kwh(self) -> float:
@@ -59,10 +62,15 @@ def _session_of_row(row: dict[str, str | None], where: str) -> Session:
     numbers = {name: number_at(row[name], f"{where}, column {name}") for name in NUMBER_COLUMNS}
     expected_text = (row.get(EXPECTED_COLUMN) or "").strip()
     expected_s = number_at(expected_text, f"{where}, column {EXPECTED_COLUMN}") if expected_text else None
+    phases_text = (row.get(PHASES_COLUMN) or "").strip()
+    phases = number_at(phases_text, f"{where}, column {PHASES_COLUMN}") if phases_text else None
+    if phases not in (None, 1, 3):
+        raise InputError(f"{where}, column {PHASES_COLUMN}: {phases:g} is neither 1 nor 3")
     session = Session(
         session_id=(row["session_id"] or "").strip(),
         connector=(row["connector"] or "").strip(),
         expected_departure_s=expected_s,
+        phases=None if phases is None else int(phases),
         **numbers,
     )
     if not session.session_id:
@@ -100,7 +108,7 @@ def _number_text(value: float, decimals: int) -> str:
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
-def _row_of_session(session: Session, with_expected: bool) -> list[str]:
+def _row_of_session(session: Session, with_expected: bool, with_phases: bool) -> list[str]:
     row = [
         session.session_id,
         session.connector,
@@ -115,6 +123,8 @@ def _row_of_session(session: Session, with_expected: bool) -> list[str]:
     if with_expected:
         expected_s = session.expected_departure_s
         row.append("" if expected_s is None else _number_text(expected_s, 3))
+    if with_phases:
+        row.append("" if session.phases is None else str(session.phases))
     return row
 
 
@@ -122,8 +132,9 @@ def write_sessions_csv(path: Path, sessions: list[Session]) -> None:
     with_expected = any(session.expected_departure_s is not None for session in sessions)
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
-    writer.writerow(COLUMNS + ((EXPECTED_COLUMN,) if with_expected else ()))
-    writer.writerows(_row_of_session(session, with_expected) for session in sessions)
+    with_phases = any(session.phases is not None for session in sessions)
+    writer.writerow(COLUMNS + ((EXPECTED_COLUMN,) if with_expected else ()) + ((PHASES_COLUMN,) if with_phases else ()))
+    writer.writerows(_row_of_session(session, with_expected, with_phases) for session in sessions)
     write_atomically(path, buffer.getvalue())
 
 

@@ -48,6 +48,7 @@ class Run:
     time_s: np.ndarray
     limit_kw: np.ndarray
     power_kw: np.ndarray
+    cost: float | None = None  # of the energy; None: it had no price
 
 
 def _spread(summary: dict, name: str) -> Spread:
@@ -91,6 +92,7 @@ def read_run(policy: str, folder: Path) -> Run:
     try:
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
         numbers = {name: float(summary[name]) for name in SUMMARY_NUMBERS}
+        cost = None if summary.get("energy_cost") is None else float(summary["energy_cost"])
         iterations, solve_ms = _spread(summary, "iterations"), _spread(summary, "solve_ms")
         departures = _read_departures(folder / "sessions.csv")
         steps = _read_steps(folder / "steps.csv")
@@ -112,6 +114,7 @@ def read_run(policy: str, folder: Path) -> Run:
         time_s=steps[:, 0],
         limit_kw=steps[:, 1],
         power_kw=steps[:, 2],
+        cost=cost,
     )
 
 

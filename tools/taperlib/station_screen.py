@@ -14,8 +14,12 @@ DAY_S = 86_400
 EMCY_LINES = 5
 LEAST_ROWS = 3
 GAP = 2
-STYLE_OF_REASON = {"offline": "red", "fault": "red", "version": "red", "waiting": "yellow", "hand-over": "yellow",
-                   "hand over": "yellow", "site limit": "yellow", "feeder limit": "yellow", "complete": "green"}
+STYLE_OF_REASON = {
+    **dict.fromkeys(("offline", "fault", "version", "locked out", "over draw"), "red"),
+    **dict.fromkeys(("waiting", "hand over", "site limit", "feeder limit", "phase limit", "imbalance limit",
+                     "failsafe limit", "grid pause"), "yellow"),
+    "complete": "green",
+}
 STYLE_OF_MODE = {"plan": "green", "fallback": "yellow"}
 STYLE_OF_SEVERITY = {"fault": "red", "warning": "yellow"}
 
@@ -48,7 +52,13 @@ def number(value: float | None, digits: int = 1, unit: str = "") -> str:
 
 
 def _soc(row: Connector, _context: Context) -> str:
-    return number(row.soc_percent, 0, "%")
+    """An estimate, because the vehicle's own report is old, is marked."""
+    return ("~" if row.soc_estimated else "") + number(row.soc_percent, 0, "%")
+
+
+def ordinal(place: int) -> str:
+    ending = "th" if place % 100 in (11, 12, 13) else {1: "st", 2: "nd", 3: "rd"}.get(place % 10, "th")
+    return f"{place}{ending}"
 
 
 def _measured(row: Connector, _context: Context) -> str:
@@ -66,9 +76,10 @@ def _departure(row: Connector, context: Context) -> str:
 
 
 def _reason(row: Connector, _context: Context) -> str:
-    """A question mark after what no PLAN said and the bus does not show: it is inferred."""
+    """A question mark after what no OUTLOOK said and the bus does not show: it is inferred."""
     sure = row.reason_told or row.reason in ("offline", "no vehicle")
-    return row.reason + ("" if sure else "?")
+    place = "" if row.waiting_place is None else f", {ordinal(row.waiting_place)} of {row.waiting_of}"
+    return row.reason + ("" if sure else "?") + place
 
 
 COLUMNS = (
@@ -87,7 +98,9 @@ COLUMNS = (
     Column("kW", 5, lambda row, _: number(row.power_kw), 2),
     Column("plan", 5, lambda row, _: number(row.planned_kw), 8),
     Column("kWh", 5, lambda row, _: number(row.energy_kwh), 6),
-    Column("why", 16, _reason, 0, right=False),
+    Column("will", 4, lambda row, _: number(row.expected_soc_percent, 0, "%"), 14),
+    Column("short", 5, lambda row, _: number(row.short_kwh), 15),
+    Column("why", 18, _reason, 0, right=False),
 )
 
 

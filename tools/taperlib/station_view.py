@@ -8,7 +8,7 @@ from taperlib.canbus import GATEWAY_NODE, UNPROTECTED, Database, Frame, Receiver
 EVSE_STATUS_TIMEOUT_S = 1.0
 CTRL_STATUS_TIMEOUT_S = 3.0
 SITE_LIMIT_TIMEOUT_S = 5.0
-PLAN_TIMEOUT_S = 90.0  # round robin: with sixty connectors each is told once a minute
+PLAN_TIMEOUT_S = 90.0  # PLAN and OUTLOOK, round robin: with sixty connectors each is told once a minute
 ECHO_TIME_S = 0.5  # for a connector to echo a new setpoint
 RATE_WINDOW_S = 5
 MOST_EMCY = 20
@@ -64,6 +64,12 @@ class Connector:
     energy_kwh: float | None = None
     echo_ok: bool | None = None
     planned_kw: float | None = None
+    waiting_place: int | None = None
+    waiting_of: int | None = None
+    soc_estimated: bool = False
+    expected_soc_percent: float | None = None
+    short_kwh: float | None = None
+    because: str | None = None
 
 
 @dataclass
@@ -147,7 +153,7 @@ class StationView:
 
     def _forget_departed(self, node: int, data: bytes) -> None:
         if node in self._parameters and not _has_vehicle(self.database.decode("EVSE_STATUS", data)):
-            for name in (*PARAMETERS, "PLAN"):
+            for name in (*PARAMETERS, "PLAN", "OUTLOOK"):
                 self._newest.pop((name, node), None)
             del self._parameters[node]
 
@@ -291,18 +297,20 @@ class StationView:
 
     def _add_reason(self, row: Connector, station: Station, now_s: float) -> None:
         plan = self._values("PLAN", row.node, now_s, PLAN_TIMEOUT_S)
+        outlook = self._values("OUTLOOK", row.node, now_s, PLAN_TIMEOUT_S)
         row.planned_kw = _kilo(plan.get("power_0")) if row.vehicle else None
         seen = self._seen_reason(row, now_s)
         if seen:
             row.reason = seen
-        elif isinstance(plan.get("reason"), str) and plan["reason"] != "no vehicle":
-            row.reason, row.reason_told = plan["reason"], True
+        elif isinstance(outlook.get("reason"), str) and outlook["reason"] != "no vehicle":
+            row.reason, row.reason_told = outlook["reason"], True
+            _add_outlook(row, outlook)
         else:
             row.reason = self._inferred_reason(row, station, now_s)
 
     @staticmethod
     def _seen_reason(row: Connector, now_s: float) -> str | None:
-        """What the connector itself shows, newer than any plan."""
+        """What the connector itself shows, newer than any outlook."""
         if not row.online:
             return "offline"
         return None if row.vehicle else "no vehicle"
@@ -350,6 +358,16 @@ class StationView:
 
 def _has_vehicle(status: dict) -> bool:
     return bool(status.get("ev_present")) and status["pilot_state"] != "A"
+
+
+def _add_outlook(row: Connector, outlook: dict) -> None:
+    if outlook["waiting_place"]:
+        row.waiting_place, row.waiting_of = outlook["waiting_place"], outlook["waiting_of"]
+    row.soc_estimated = bool(outlook["soc_estimated"])
+    row.expected_soc_percent = outlook["soc_at_departure"]
+    row.short_kwh = _kilo(outlook["short_energy"])
+    if row.short_kwh:
+        row.because = str(outlook["because"])
 
 
 def _kilo(value: float | None) -> float | None:

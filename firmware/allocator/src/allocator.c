@@ -27,7 +27,7 @@ static void open_rooms(round_t *round, const taper_supply_t *supply, const int32
     for (uint8_t i = 0; i < round->config->connector_count; i++) {
         const taper_booking_t booking = taper_booking_now(round->config, round->snapshot, i);
         round->weights[i] = taper_rooms_weigh(&round->rooms, &booking);
-        if (reserved_mA != NULL && reserved_mA[i] != 0) {
+        if (reserved_mA != NULL) {
             taper_rooms_draw(&round->rooms, round->config, i, &round->weights[i], reserved_mA[i]);
         }
     }
@@ -119,9 +119,10 @@ static void raise(round_t *round, uint8_t i, int32_t target_mA) {
         return;
     }
     const int32_t fits_mA = taper_rooms_fit_mA(&round->rooms, round->config, i, &round->weights[i], more_mA);
-    const int32_t raised_mA = whole_steps(taper_max_i32(fits_mA, 0));
-    draw(round, &round->rooms, i, raised_mA);
-    round->current_mA[i] = present_mA + raised_mA;
+    if (fits_mA >= TAPER_CURRENT_STEP_mA) {
+        draw(round, &round->rooms, i, whole_steps(fits_mA));
+        round->current_mA[i] = present_mA + whole_steps(fits_mA);
+    }
 }
 
 /** Whether it has its minimum, or needs none. A rank binds nobody: it may name a connector that there is not. */

@@ -7,13 +7,15 @@
  * The current of a delta line is bounded by two rows together, and a connector may be in one of them only. What the other one
  * is overdrawn by leaves it no room either: the current would rise, though no row did.
  */
-static void share_excess(taper_rooms_t *rooms, uint8_t k) {
-    for (unsigned line = 0; line < 3; line++) {
-        int64_t *first = &rooms->room[k][TAPER_ROW_DELTA_L1 + line];
-        int64_t *second = &rooms->room[k][TAPER_ROW_DELTA_L1_B + line];
-        const int64_t least = *first < *second ? *first : *second;
-        if (least < 0) {
-            *first = *second = least;
+static void share_excess(taper_rooms_t *rooms, uint8_t group_count) {
+    for (uint8_t k = 0; k < group_count; k++) {
+        for (int line = 0; line < 3; line++) {
+            int64_t *first = &rooms->room[k][TAPER_ROW_DELTA_L1 + line];
+            int64_t *second = &rooms->room[k][TAPER_ROW_DELTA_L1_B + line];
+            const int64_t least = *first < *second ? *first : *second;
+            if (least < 0) {
+                *first = *second = least;
+            }
         }
     }
 }
@@ -27,9 +29,7 @@ static void open_rooms_left(taper_rooms_t *rooms, const taper_ledger_t *ledger,
         const taper_booking_t booking = taper_booking_now(config, snapshot, i);
         taper_rooms_take(rooms, config, i, &booking, taper_ledger_may_mA(ledger, i));
     }
-    for (uint8_t k = 0; k < config->group_count; k++) {
-        share_excess(rooms, k);
-    }
+    share_excess(rooms, config->group_count);
 }
 
 /** At least the minimum current, or nothing. */
@@ -74,4 +74,5 @@ void taper_ledger_grant(const taper_ledger_t *ledger, const taper_station_config
             raise_one(&rooms, ledger, config, snapshot, i, target->current_mA[i], &granted->current_mA[i]);
         }
     }
+    taper_balance(config, snapshot, rank, granted);
 }

@@ -1,7 +1,7 @@
 /* The last gate. It shares no code with the allocator on purpose: one mistake must not blind both. */
 #include "taper/allocator.h"
 
-/** Beyond 100 kA squares do not fit 64 bits, nor is there such a limit [0.1 mA]. */
+/** 100 kA [0.1 mA]: beyond it squares do not fit 64 bits. No limit is taken to be as great. */
 #define MOST_uA100 INT64_C(1000000000)
 
 /** What flows into a group. */
@@ -30,10 +30,13 @@ static uint8_t lines_of(const taper_connector_config_t *connector) {
     static const uint8_t first[] = {1, 1, 2, 4, 1, 2, 4};     /* by taper_rotation_t: line of conductor L1 */
     static const uint8_t first_two[] = {3, 3, 6, 5, 5, 3, 6}; /* of L1 and L2 */
     const uint8_t rotation = connector->rotation < sizeof first ? connector->rotation : 0;
-    if (connector->is_dc || (connector->phases > 1 && !connector->line_to_line)) {
+    if (connector->is_dc) {
         return 7;
     }
-    return connector->line_to_line ? first_two[rotation] : first[rotation];
+    if (connector->line_to_line) {
+        return first_two[rotation];
+    }
+    return connector->phases == 1 ? first[rotation] : 7;
 }
 
 /** How a connector draws, by the snapshot, or else by its description. */
@@ -81,19 +84,24 @@ static void add_load(load_t *sum, const load_t *load) {
     }
 }
 
-/** Of a limit, what a current in one line leaves [0.1 mA]; negative: less than nothing. */
-static int64_t left_uA100(int32_t limit_mA, int64_t other_uA) {
+/** A current of a pair, rounded up [0.1 mA]. */
+static int64_t pair_uA100(const load_t *load, unsigned pair) {
+    const int64_t current = quotient_up(load->pair_uA[pair % 3], 100);
+    return current < MOST_uA100 ? current : MOST_uA100;
+}
+
+/** Whether a current with this square [(0.1 mA)^2] fits beside `other_uA` in a line. */
+static bool fits(int64_t square, int64_t other_uA, int32_t limit_mA) {
     const int64_t left_uA = (int64_t)limit_mA * 1000 - other_uA;
-    const int64_t left = left_uA < 0 ? -1 : left_uA / 100;
-    return left < MOST_uA100 ? left : MOST_uA100;
+    const int64_t left = left_uA / 100 < MOST_uA100 ? left_uA / 100 : MOST_uA100 - 1;
+    return left_uA >= 0 && square <= left * left;
 }
 
 /** A line carries the currents x and y of two pairs, which differ by 60 degrees: |I|^2 = x^2 + x y + y^2. */
 static bool line_passes(const load_t *load, unsigned line, int32_t limit_mA) {
-    const int64_t left = left_uA100(limit_mA, load->line_uA[line]);
-    const int64_t x = quotient_up(load->pair_uA[line], 100);
-    const int64_t y = quotient_up(load->pair_uA[(line + 2) % 3], 100);
-    return x <= left && y <= left && x * x + x * y + y * y <= left * left;
+    const int64_t x = pair_uA100(load, line);
+    const int64_t y = pair_uA100(load, line + 2);
+    return fits(x * x + x * y + y * y, load->line_uA[line], limit_mA);
 }
 
 /**
@@ -101,12 +109,11 @@ static bool line_passes(const load_t *load, unsigned line, int32_t limit_mA) {
  * and c, that is what flows from the lines a and c to neutral.
  */
 static bool delta_passes(const load_t *load, unsigned line, int32_t limit_mA) {
-    const int64_t left = left_uA100(limit_mA, load->line_uA[line] + load->line_uA[(line + 2) % 3]);
-    const int64_t ab = quotient_up(load->pair_uA[line], 100);
-    const int64_t bc = quotient_up(load->pair_uA[(line + 1) % 3], 100);
-    const int64_t ca = quotient_up(load->pair_uA[(line + 2) % 3], 100);
-    return ab <= left && bc <= left && 2 * ca <= left &&
-           ab * ab - ab * bc + bc * bc + 2 * ca * (ab + bc) + 4 * ca * ca <= left * left;
+    const int64_t ab = pair_uA100(load, line);
+    const int64_t bc = pair_uA100(load, line + 1);
+    const int64_t ca = pair_uA100(load, line + 2);
+    const int64_t square = ab * ab - ab * bc + bc * bc + 2 * ca * (ab + bc) + 4 * ca * ca;
+    return fits(square, load->line_uA[line] + load->line_uA[(line + 2) % 3], limit_mA);
 }
 
 /** Current on a line as it counts for imbalance: pairs count on both of their lines. */

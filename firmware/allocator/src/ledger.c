@@ -259,3 +259,7 @@ int32_t taper_ledger_fallback_mA(const taper_ledger_t *ledger, uint8_t connector
     const taper_ledger_entry_t *entry = &ledger->entry[connector];
     return taper_max_i32(most_open_mA(entry, entry->fallback_dA), entry->over_fallback_mA);
 }
+
+int32_t taper_ledger_unreached_mA(const taper_ledger_t *ledger, uint8_t connector) {
+    return ledger->entry[connector].over_fallback_mA;
+}

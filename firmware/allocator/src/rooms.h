@@ -4,16 +4,15 @@
 
 #include "taper/rows.h"
 
-/** Rows of sums by group and column. A column is a kind of row that some group has: others cost nothing. */
+/** Rows of sums by group and kind. Only kinds that some group has are looked at: others cost nothing. */
 typedef struct {
-    uint8_t columns;
-    uint8_t kind[TAPER_ROW_SUMS]; /**< taper_row_kind_t by column */
-    int64_t room[TAPER_MAX_GROUPS]
-                [TAPER_ROW_SUMS]; /**< thousandths of the row's unit: mW, or uA. INT64_MAX: the group
-                                                         has no such row */
+    uint8_t kinds;
+    uint8_t kind[TAPER_ROW_SUMS];                   /**< [kinds] taper_row_kind_t */
+    int64_t room[TAPER_MAX_GROUPS][TAPER_ROW_SUMS]; /**< by kind, in thousandths of the row's unit: mW, or uA.
+                                                         INT64_MAX: the group has no such row */
 } taper_rooms_t;
 
-/** Weights of one connector in the rows above it, by column; >= 0. */
+/** Weights of one connector in the rows above it, by kind; >= 0. Those of kinds that no group has are not set. */
 typedef struct {
     int32_t of[TAPER_ROW_SUMS];
 } taper_weights_t;
@@ -22,7 +21,7 @@ typedef struct {
 void taper_rooms_open(taper_rooms_t *rooms, const taper_station_config_t *config,
                       const taper_supply_t *supply);
 
-/** What 1 A of a connector takes from each column. */
+/** What 1 A of a connector takes from each row. */
 taper_weights_t taper_rooms_weigh(const taper_rooms_t *rooms, const taper_booking_t *booking);
 
 /** How much of `wanted_mA` (>= 0) connector `i` can be raised by [mA]; negative: some row above it is overdrawn. */

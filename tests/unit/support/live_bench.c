@@ -43,14 +43,14 @@ static void start_station(void) {
     live.station_dead = false;
 }
 
-static const sim_limits_t *choose_limits(const live_options_t *options) {
+static const sim_course_t *choose_limits(const live_options_t *options) {
     if (options->limits != NULL) {
         return options->limits;
     }
     if (options->limit_kw < 0.0) {
         return NULL;
     }
-    sim_limits_constant(&live.constant_limit, options->limit_kw);
+    sim_course_constant(&live.constant_limit, options->limit_kw);
     return &live.constant_limit;
 }
 
@@ -93,7 +93,7 @@ void live_bench_start(const live_options_t *options, const sim_session_t *sessio
 
 void live_bench_end(void) {
     sim_field_free(&live.field);
-    sim_limits_free(&live.constant_limit);
+    sim_course_free(&live.constant_limit);
 }
 
 /** Frames to a station that is not there reach nobody. */

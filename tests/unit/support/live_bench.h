@@ -19,7 +19,7 @@ typedef struct {
     const taper_solver_t *solver;        /**< NULL: none, earliest deadline first */
     const taper_policy_t *policy;        /**< NULL: the solver's plan */
     double limit_kw;                     /**< told by the gateway; negative: none. Not used with `limits` */
-    const sim_limits_t *limits;          /**< NULL: `limit_kw` always */
+    const sim_course_t *limits;          /**< NULL: `limit_kw` always */
     uint32_t time_scale;                 /**< of station and field; 0 is 1 */
     uint32_t vehicle_delay_ms, grace_ms; /**< as in sim_field_options_t */
     bool no_gateway;
@@ -39,7 +39,7 @@ typedef struct {
     sim_session_t session[LIVE_SESSIONS];
     sim_sessions_t sessions;
     sim_outcome_t outcome[LIVE_SESSIONS];
-    sim_limits_t constant_limit;
+    sim_course_t constant_limit;
     uint32_t now_ms;
     uint32_t
         next_tick_ms; /**< of the station: a second of the bus for the stations here, whatever the time scale */

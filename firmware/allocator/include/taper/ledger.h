@@ -106,6 +106,13 @@ int32_t taper_ledger_told_mA(const taper_ledger_t *ledger, uint8_t connector);
 int32_t taper_ledger_fallback_mA(const taper_ledger_t *ledger, uint8_t connector);
 
 /**
+ * The fallback current that a connector may draw whatever it is told now: a setpoint ran out, and none after it was heard to
+ * be accepted [mA]. taper_allocate() has to reserve it also for a connector that is heard: else what the others are lowered
+ * to when a limit falls leaves no room for it.
+ */
+int32_t taper_ledger_unreached_mA(const taper_ledger_t *ledger, uint8_t connector);
+
+/**
  * Bound `target`, which holds every limit by itself, by what others may still draw: decreases go through, increases in the
  * order of `rank` as far as room is left in every row. Below a row that is overdrawn (its limit fell, or a vehicle over-draws)
  * nobody is told more than last, so the excess ends when the slowest vehicle has followed. `granted <= target` for every
