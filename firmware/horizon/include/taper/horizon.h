@@ -25,6 +25,7 @@
 #ifndef TAPER_HORIZON_H
 #define TAPER_HORIZON_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -56,6 +57,8 @@ typedef struct {
     taper_real_t lower[TAPER_MAX_ROWS];       /**< row bounds; +-TAPER_REAL_UNBOUNDED: none */
     taper_real_t upper[TAPER_MAX_ROWS];
     taper_real_t taper_keep[TAPER_MAX_CONNECTORS]; /**< 1 - a_i: taper row (i,t) is v(i,t) - keep v(i,t-1) */
+    bool waits
+        [TAPER_MAX_CONNECTORS]; /**< for a lower price, with time to spare: more than planned is of no use */
     uint16_t sum_count;
     taper_sum_t sum[TAPER_MAX_PLAN_ROWS];
     taper_real_t weight[TAPER_MAX_PLAN_ROWS]
