@@ -9,8 +9,8 @@
 #define PRICED_DISCOUNT ((taper_real_t)0.99)
 /** Worth that the dearest step loses at full weight. Below 0.99^24, so that no energy is worth less than nothing. */
 #define PRICE_SPAN ((taper_real_t)0.75)
-/** With this many times the known supply wanted, the price counts for nothing; half a time less, in full. */
-#define FULL_LOAD (1.5)
+/** With this many times the known supply wanted, the price counts for nothing; a quarter less, in full. */
+#define FULL_LOAD ((taper_real_t)1.25)
 /** Who has less to spare than this does not wait for a lower price: the need takes longer as the taper falls. */
 #define RESERVE_FACTOR ((taper_real_t)1.25)
 #define RESERVE_STEPS  2
@@ -44,7 +44,7 @@ static taper_real_t leisure(const taper_worth_t *worth, const taper_snapshot_t *
     }
     const taper_real_t supply_Wh = supply_W * (taper_real_t)worth->step_s / 3600;
     const taper_real_t load = supply_Wh > 0 ? wanted_Wh / supply_Wh : FULL_LOAD;
-    return taper_real_max(taper_real_min(2 * (FULL_LOAD - load), 1), 0);
+    return taper_real_max(taper_real_min(4 * (FULL_LOAD - load), 1), 0);
 }
 
 static void look_at_prices(taper_worth_t *worth, taper_real_t weight) {
