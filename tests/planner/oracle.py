@@ -165,6 +165,7 @@ class Problem:
         self._size, self._rows, self._bounds, self._dynamics = 2 * count, [], [], []
         self.quadratic, self.linear = np.zeros(2 * count), np.zeros(2 * count)
         self._draws = [Draw.of(station.connector[i], demands[i].conductors, station.volts) for i in self.connectors]
+        self._power_share = np.array(limit_W) / max(*limit_W, 1)
         for chain, connector in enumerate(self.connectors):
             allowed_W = station.connector[connector].max_mA * self._draws[chain].W_per_A / 1000
             self._add_vehicle(chain, demands[connector], allowed_W)
@@ -186,13 +187,20 @@ class Problem:
         self._rows.append(row)
         self._bounds.append(bound)
 
+    def _weight(self, stay: float, charging: float) -> float:
+        """Of a vehicle that stays, and has to charge, so many steps. A step of little power is part of one."""
+        there = np.clip(stay - np.arange(self.station.steps), 0, 1)
+        there[0] = 1
+        useful = there @ self._power_share + max(stay - self.station.steps, 0)
+        can = min(useful / charging, 1) if charging > 0 else 1
+        return 1 + can**0.25 * (8 / max(useful, 1) + 3 / (max(useful - charging, 0) + 16))
+
     def _add_vehicle(self, chain: int, demand: Demand, connector_W: float) -> None:
         base_W, step_s = self.station.base_W, self.station.step_s
         fall_per_Wh = demand.taper_W / demand.capacity_Wh if demand.capacity_Wh else 0.0
         now_W = max(demand.peak_W - fall_per_Wh * demand.stored_Wh, 0.0)
-        steps_left = int(demand.departs_in_s / step_s)
-        charging_s = demand.need_Wh * 3600 / min(now_W, connector_W) if now_W > 0 else 0.0
-        weight = 1 + 8 / max(steps_left, 1) + 3 / (max(demand.departs_in_s - charging_s, 0) / step_s + 16)
+        charging = demand.need_Wh * 3600 / min(now_W, connector_W) / step_s if now_W > 0 else 0.0
+        weight = self._weight(demand.departs_in_s / step_s, charging)
         for t in range(self.station.steps):
             u, x, before = self._u(chain, t), self._x(chain, t), self._x(chain, t - 1)
             self.quadratic[u] = DISCOUNT ** (t + 1) * CURVATURE

@@ -165,6 +165,38 @@ static void test_row_26_a_clock_that_was_set_makes_the_planner_think_again(void)
     TEST_ASSERT_EQUAL(TAPER_MODE_PLAN, taper_station_mode(&bench.station));
 }
 
+/** A station to which price counts, with one vehicle for 8 hours, and a price that halves in an hour. */
+static void start_with_a_falling_price(int32_t weight_permille, taper_station_config_t *config) {
+    taper_station_options_t options = with_solver();
+    *config = *options.config;
+    config->price_weight_permille = weight_permille;
+    options.config = config;
+    bench_start(&options);
+    taper_price_curve_t price = {.count = 6};
+    for (uint16_t hour = 0; hour < price.count; hour++) {
+        price.point[hour] = (taper_price_point_t){.time_ms = bench.now_ms + hour * UINT32_C(3600000),
+                                                  .milli_per_kWh = hour == 0 ? 300 : 150};
+    }
+    TEST_ASSERT_EQUAL(TAPER_OK, taper_limits_set_price(&bench.station.limits, &price));
+    bench_send_all(1, 50000);
+    taper_message_t stay = {.kind = TAPER_MESSAGE_EV_PARAM_B, .node = 1};
+    stay.as.ev_param_b = (taper_ev_param_b_t){
+        .revision = 7, .session = 7, .departure_min = 10000 + 480, .peak_W = 11000, .min_mA = TAPER_ABSENT};
+    bench_send(&stay);
+    bench_step();
+    TEST_ASSERT_EQUAL(TAPER_MODE_PLAN, taper_station_mode(&bench.station));
+}
+
+static void test_who_has_time_waits_for_a_lower_price_and_gets_no_power_that_is_left_over(void) {
+    taper_station_config_t config;
+    start_with_a_falling_price(0, &config);
+    TEST_ASSERT_GREATER_THAN_INT32(0, bench.station.setpoints.current_mA[0]);
+    start_with_a_falling_price(1000, &config);
+    TEST_ASSERT_TRUE(bench.station.plan_waits[0]);
+    TEST_ASSERT_EQUAL_INT32(bench.station.proposal.wish_W[0], bench.station.proposal.ceiling_W[0]);
+    TEST_ASSERT_EQUAL_INT32(0, bench.station.setpoints.current_mA[0]);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_a_soc_frame_in_gives_a_setpoint_frame_out_through_every_hop);
@@ -174,5 +206,6 @@ int main(void) {
     RUN_TEST(test_a_plan_ends_after_two_steps_without_a_renewal);
     RUN_TEST(test_row_5_the_greatest_values_of_the_wire_do_not_spoil_the_plan);
     RUN_TEST(test_row_26_a_clock_that_was_set_makes_the_planner_think_again);
+    RUN_TEST(test_who_has_time_waits_for_a_lower_price_and_gets_no_power_that_is_left_over);
     return UNITY_END();
 }

@@ -63,6 +63,7 @@ static void keep_plan(taper_station_t *station) {
             station->plan_W[t][i] = planned ? taper_planner_power_W(&station->planner, i, t) : 0;
         }
         station->plan_session[i] = station->planner.session[i];
+        station->plan_waits[i] = usable && station->planner.horizon.waits[i];
         keep_prospect(station, i, usable);
     }
 }
@@ -104,8 +105,8 @@ bool taper_station_has_plan(const taper_station_t *station) {
 
 /**
  * The plan's first step is the wish; what is useful beyond it is the ceiling, so that what rounding, the solver's
- * tolerance or a falling taper leave over goes to whom the deadline presses most. A vehicle that came after the plan was
- * made has no wish yet, only a ceiling.
+ * tolerance or a falling taper leave over goes to whom the deadline presses most. Who waits for a lower price gets no more
+ * than his wish. A vehicle that came after the plan was made has no wish yet, only a ceiling.
  */
 void taper_station_propose_plan(taper_station_t *station) {
     taper_propose_edf(&station->snapshot, station->options.config->tick_ms, &station->proposal);
@@ -113,5 +114,8 @@ void taper_station_propose_plan(taper_station_t *station) {
         const bool planned = station->plan_session[i] == station->snapshot.demand[i].session;
         const int32_t plan_W = planned ? station->plan_W[0][i] : 0;
         station->proposal.wish_W[i] = taper_min_i32(plan_W, station->proposal.ceiling_W[i]);
+        if (planned && station->plan_waits[i]) {
+            station->proposal.ceiling_W[i] = station->proposal.wish_W[i];
+        }
     }
 }

@@ -4,14 +4,14 @@
 
 #include "sums.h"
 #include "taper/battery.h"
+#include "worth.h"
 
 /** What one connector brings into the problem, per unit. */
 typedef struct {
-    taper_real_t rate;   /* limit of connector and vehicle */
-    taper_real_t taper;  /* limit at the present SOC */
-    taper_real_t slope;  /* a_i per step */
-    taper_real_t need;   /* energy */
-    taper_real_t weight; /* w_i */
+    taper_real_t rate;  /* limit of connector and vehicle */
+    taper_real_t taper; /* limit at the present SOC */
+    taper_real_t slope; /* a_i per step */
+    taper_real_t need;  /* energy */
     int32_t departs_in_s;
 } chain_t;
 
@@ -44,34 +44,6 @@ static taper_real_t strongest_connector_W(const taper_station_config_t *config) 
     return (taper_real_t)strongest_mW / 1000;
 }
 
-/** Share of step t in which a vehicle is there. The running step counts whole: its power is set now. */
-static taper_real_t presence(int32_t departs_in_s, uint16_t step_s, uint8_t t) {
-    if (t == 0) {
-        return 1;
-    }
-    const int32_t left_s = taper_clamp_i32(departs_in_s - (int32_t)t * step_s, 0, step_s);
-    return (taper_real_t)left_s / (taper_real_t)step_s;
-}
-
-/** Steps that a vehicle could wait and still be served: its stay less the time its need takes at the present limit. */
-static taper_real_t laxity_steps(const taper_demand_t *demand, uint16_t step_s) {
-    const int32_t power_W = taper_min_i32(taper_demand_allowed_W(demand), taper_battery_limit_W(demand));
-    const taper_real_t charging_s =
-        power_W > 0 ? (taper_real_t)demand->need_Wh * 3600 / (taper_real_t)power_W : 0;
-    return taper_real_max((taper_real_t)demand->departs_in_s - charging_s, 0) / (taper_real_t)step_s;
-}
-
-/**
- * The weight w_i: who leaves soon comes first, and who has little time to spare. The second part sees beyond the
- * horizon, which the rows cannot: on stays longer than it, it recovers most of what the first alone loses
- * (docs/results.md, "The weight").
- */
-static taper_real_t urgency(const taper_demand_t *demand, uint16_t step_s) {
-    const int32_t steps = demand->departs_in_s / step_s;
-    return 1 + (taper_real_t)8 / (taper_real_t)taper_max_i32(steps, 1) +
-           3 / (laxity_steps(demand, step_s) + 16);
-}
-
 static chain_t chain_of(const taper_horizon_t *horizon, const taper_demand_t *demand) {
     const uint16_t step_s = horizon->config->step_s;
     const taper_real_t step_h = (taper_real_t)step_s / 3600;
@@ -82,7 +54,6 @@ static chain_t chain_of(const taper_horizon_t *horizon, const taper_demand_t *de
         .slope = slope < 1 ? slope
                            : 1, /* a battery that fills within one step: the taper row then bounds v(i,t) */
         .need = (taper_real_t)demand->need_Wh / (horizon->base_W * step_h),
-        .weight = urgency(demand, step_s),
         .departs_in_s = demand->departs_in_s,
     };
 }
@@ -107,13 +78,9 @@ static void write_chain(taper_horizon_t *horizon, uint8_t i, const chain_t *chai
                         const int32_t *site_limit_W) {
     const uint8_t steps = horizon->config->steps;
     const size_t taper_row = taper_first_taper_row(horizon->config) + (size_t)i * (steps - 1U);
-    taper_real_t worth = chain->weight * TAPER_DISCOUNT; /* of a unit of energy in step t */
     for (uint8_t t = 0; t < steps; t++) {
         const size_t v = (size_t)i * steps + t;
-        const taper_real_t next = t + 1 < steps ? worth * TAPER_DISCOUNT : 0;
-        const taper_real_t there = presence(chain->departs_in_s, horizon->config->step_s, t);
-        horizon->linear[v] = next - worth;
-        worth = next;
+        const taper_real_t there = taper_presence(chain->departs_in_s, horizon->config->step_s, t);
         horizon->lower[v] = 0;
         horizon->upper[v] =
             taper_real_min(chain->rate * there, (taper_real_t)site_limit_W[t] / horizon->base_W);
@@ -157,8 +124,12 @@ void taper_horizon_build(taper_horizon_t *horizon, const taper_station_config_t 
                          const taper_snapshot_t *snapshot, const taper_course_t *course) {
     taper_horizon_shape(horizon, config);
     taper_sums_bound(horizon, course);
+    const taper_worth_t worth = taper_worth_of_course(config, snapshot, course);
     for (uint8_t i = 0; i < config->connector_count; i++) {
+        horizon->waits[i] = snapshot->demand[i].active && taper_worth_waits(&worth, &snapshot->demand[i]);
         if (snapshot->demand[i].active) {
+            const taper_real_t weight = taper_worth_weight(&worth, &snapshot->demand[i]);
+            taper_worth_write(&worth, weight, horizon->linear + (size_t)i * config->steps);
             taper_sums_weigh(horizon, i, snapshot);
         }
         write_connector(horizon, i, &snapshot->demand[i], course->limit_W);

@@ -187,6 +187,7 @@ typedef struct {
     uint8_t next_plan, next_diag;
     int32_t plan_W[TAPER_PLAN_STEPS][TAPER_MAX_CONNECTORS]; /**< first steps of the last finished plan */
     uint8_t plan_session[TAPER_MAX_CONNECTORS];             /**< whom it was made for */
+    bool plan_waits[TAPER_MAX_CONNECTORS];                  /**< he waits for a lower price */
     uint32_t plan_made_ms;
     bool plan_usable;
     int32_t planned_limit_W; /**< site limit and table revision of the last problem */

@@ -5,12 +5,19 @@
  * `base_W`, energy in units of base_W for one step. Variables are v(i,t), the energy that connector i has received
  * from now to the end of step t = 0..T-1, so that its power is u(i,t) = v(i,t) - v(i,t-1), v(i,-1) = 0.
  *
- *     minimise  sum_t g^(t+1) sum_i [ q/2 u(i,t)^2 - w_i u(i,t) ]        g = TAPER_DISCOUNT, q = TAPER_CURVATURE,
- *               w_i = 1 + 8 / max(whole steps to departure, 1) + 3 / (laxity in steps + 16)
+ *     minimise  sum_t sum_i [ g^(t+1) q/2 u(i,t)^2 - (h^(t+1) w_i - p_t) u(i,t) ]
+ *               g = TAPER_DISCOUNT, q = TAPER_CURVATURE, h = g and p_t = 0 unless a price counts
+ *               w_i = 1 + m_i (8 / max(s_i, 1) + 3 / (laxity in steps + 16))
  *     rate      0 <= u(i,t) <= rate limit, 0 outside the stay            (paper, eq. 1 and 3)
  *     taper     u(i,t) + a_i v(i,t-1) <= limit at the present SOC        (paper, eq. 5; at t = 0 part of rate)
  *     target    v(i,T-1) <= need
  *     sum       sum of c_ri u(i,t) over the connectors of row r <= P_r(t)  (paper, eq. 2)
+ *
+ * s_i is the stay in steps, each counted by its share of the greatest limit of the course, and whole beyond the horizon.
+ * Laxity is s_i less the steps that the need takes at the present limit, at least 0; m_i, where that is more than s_i, is
+ * the fourth root of their ratio, else 1. A price counts if the course is priced, with `price_weight_permille`, and less
+ * or not at all where the vehicles want about as much as there will be: h then approaches 0.99, and p_t rises from 0 in
+ * the cheapest step to 0.75 in the dearest, so that no energy is worth less than nothing.
  *
  * The sum rows are the planned ones of the feeder tree (taper/rows.h), by ascending group and kind: power, currents of
  * lines; differences of phases are bounded on both sides. c_ri is the supply's power, or its current times the site's
@@ -25,6 +32,7 @@
 #ifndef TAPER_HORIZON_H
 #define TAPER_HORIZON_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -58,6 +66,8 @@ typedef struct {
     taper_real_t lower[TAPER_MAX_ROWS];       /**< row bounds; +-TAPER_REAL_UNBOUNDED: none */
     taper_real_t upper[TAPER_MAX_ROWS];
     taper_real_t taper_keep[TAPER_MAX_CONNECTORS]; /**< 1 - a_i: taper row (i,t) is v(i,t) - keep v(i,t-1) */
+    bool waits
+        [TAPER_MAX_CONNECTORS]; /**< for a lower price, with time to spare: more than planned is of no use */
     uint16_t sum_count;
     taper_sum_t sum[TAPER_MAX_PLAN_ROWS];
     taper_real_t weight[TAPER_MAX_PLAN_ROWS]
