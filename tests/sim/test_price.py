@@ -69,6 +69,17 @@ def test_a_price_without_weight_changes_no_current(planning_sim):
     assert priced.connectors == plain.connectors
 
 
+def test_a_plan_that_minds_the_price_waits_for_cheap_hours(planning_sim):
+    planning_sim.write("price.csv", CHEAP_LATER)
+    early = planning_sim.run(FLEET, "--price-csv", "price.csv", "--price-weight", "0", policy="soc-mpc", out="early")
+    cheap = planning_sim.run(FLEET, "--price-csv", "price.csv", "--price-weight", "1", policy="soc-mpc", out="cheap")
+    assert cheap.code == 0
+    assert cheap.summary["price_weight"] == 1
+    assert cheap.summary["satisfied"] == early.summary["satisfied"] == 4
+    assert cheap.summary["cost_per_kwh"] < 0.5 * early.summary["cost_per_kwh"]
+    assert "planned_later" in {row["reason"] for row in cheap.connectors}
+
+
 def test_a_price_curve_longer_than_the_station_keeps_is_followed_to_its_end(planning_sim):
     """A price that changes each minute: far more points than one transfer holds, so it goes out in pieces."""
     points = "".join(f"{minute * 60},{0.2 + 0.001 * (minute % 2):.3f}\n" for minute in range(600))
