@@ -107,18 +107,21 @@ static void propose(taper_station_t *station, taper_mode_t mode) {
     }
 }
 
-/** What a connector draws beside its target: all of it if it cannot be told anything, or else what it takes too much, and
-    the fallback current of one that is heard but does not hear us. */
+/** Whether a connector reports, and says that it draws its fallback current: it may be deaf. */
+static bool is_deaf(const taper_station_t *station, uint8_t i) {
+    return station->sessions.session[i].status.fallback_active &&
+           taper_ledger_unreached_mA(&station->ledger, i) > 0;
+}
+
+/** What a connector draws beside its target: all of it if it cannot be told anything, else what it takes too much. */
 static int32_t reserve_mA(const taper_station_t *station, uint8_t i, uint32_t now_ms) {
-    const bool hears = station->ledger.entry[i].over_fallback_mA == 0; /* else it may report, and be deaf */
     const bool obeys =
         taper_session_is_online(&station->sessions, i, now_ms) && station->draw[i].state == TAPER_DRAW_NORMAL;
-    if (!obeys || !hears) {
+    if (!obeys || is_deaf(station, i)) {
         return taper_ledger_may_mA(&station->ledger, i);
     }
     const int32_t drawn_mA = station->ledger.entry[i].drawn_mA;
-    return taper_max_i32(drawn_mA - taper_ledger_told_mA(&station->ledger, i),
-                         taper_ledger_unreached_mA(&station->ledger, i));
+    return taper_max_i32(drawn_mA - taper_ledger_told_mA(&station->ledger, i), 0);
 }
 
 /** Currents for the proposal that hold every limit, once all connectors have followed. */
