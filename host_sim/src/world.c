@@ -21,6 +21,9 @@
 #define ROUND_ms 800u
 /** A hand-over that did not get through so long after the slowest vehicle has reacted goes on in the next tick. */
 #define PATIENCE_ms 1000u
+/** Then rounds come with the pause that setpoints keep between two changes, until deadbands have settled as well. */
+#define LATER_ROUND_ms 5200
+#define SETTLED_ms     (TAPER_SHAPE_SETTLE_ms + 2u * LATER_ROUND_ms)
 /** The longest curve takes some 1000. */
 #define CURVE_ROUNDS 5000
 
@@ -126,25 +129,28 @@ static uint32_t next_round_ms(const world_t *world, uint32_t passed_ms) {
     if (passed_ms == 0) {
         return ECHO_ms;
     }
+    if (passed_ms > reacted_ms + PATIENCE_ms) {
+        return passed_ms + LATER_ROUND_ms;
+    }
     return passed_ms < reacted_ms && passed_ms + ROUND_ms > reacted_ms ? reacted_ms : passed_ms + ROUND_ms;
 }
 
 /**
  * What one connector gives up reaches another: echoes in, time passes until the vehicle is known to have followed,
- * setpoints out; until nobody waits any more, or the tick ends.
+ * setpoints out; until all have their targets, as their ramps and deadbands allow, or the tick ends.
  */
 static bool hand_over(world_t *world, int64_t now_s) {
-    const uint32_t end_ms = world->reaction_ms + PATIENCE_ms;
+    const uint32_t end_ms = SETTLED_ms + world->reaction_ms;
     const uint32_t tick_ms = world->run->station->tick_ms;
     uint32_t passed_ms = next_round_ms(world, 0);
     bool sent = true;
     for (unsigned round = 1;
-         sent && passed_ms <= end_ms && passed_ms < tick_ms && taper_station_hands_over(&world->station);
+         sent && passed_ms <= end_ms && passed_ms < tick_ms && !taper_station_is_settled(&world->station);
          round++) {
         const uint32_t now_ms = (uint32_t)((uint64_t)now_s * 1000U) + passed_ms;
         sim_account_pass(&world->account, (double)now_s + (double)passed_ms / 1000.0);
         taper_membus_set_time(&world->bus, now_ms);
-        sent = repeat_reports(world, now_s, passed_ms, round % 2 == 0);
+        sent = repeat_reports(world, now_s, passed_ms, round % 2 == 0 || passed_ms > world->reaction_ms + PATIENCE_ms);
         taper_station_poll(&world->station, now_ms);
         sim_fleet_hear(&world->fleet);
         sim_account_obey(&world->account);

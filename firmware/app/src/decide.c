@@ -213,12 +213,16 @@ static void grant(taper_station_t *station, uint32_t now_ms) {
     taper_station_seal(station);
 }
 
+bool taper_station_is_settled(const taper_station_t *station) {
+    return memcmp(&station->target, &station->setpoints, sizeof station->target) == 0;
+}
+
 bool taper_station_hands_over(const taper_station_t *station) {
     return memcmp(&station->shaped, &station->setpoints, sizeof station->shaped) != 0;
 }
 
 void taper_station_regrant(taper_station_t *station, uint32_t now_ms) {
-    if (!station->stopped && memcmp(&station->target, &station->setpoints, sizeof station->target) != 0) {
+    if (!station->stopped && !taper_station_is_settled(station)) {
         grant(station, now_ms);
     }
 }

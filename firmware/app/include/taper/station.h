@@ -260,6 +260,9 @@ taper_outlook_t taper_station_outlook(const taper_station_t *station, uint8_t co
 /** Whether some connector waits for what another has yet to give up: the next poll may have more for it. */
 bool taper_station_hands_over(const taper_station_t *station);
 
+/** Whether every connector was told its target: nothing waits for others, for time, or for a ramp. */
+bool taper_station_is_settled(const taper_station_t *station);
+
 /** Mode of the last step. */
 taper_mode_t taper_station_mode(const taper_station_t *station);
 
