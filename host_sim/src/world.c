@@ -166,7 +166,7 @@ static bool hand_over(world_t *world, int64_t now_s) {
         passed_ms = next_round_ms(world, passed_ms);
     }
     if (sent && tick_ms > VALIDITY_ms + passed_ms) { // a real station repeats its setpoints all the time
-        sent = run_round(world, now_s, tick_ms - ECHO_ms, true);
+        sent = run_round(world, now_s, tick_ms - ROUND_ms, true);
     }
     return sent;
 }
