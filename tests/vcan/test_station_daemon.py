@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from conftest import PATIENCE_S, program, wait_until
 from daemon_bench import HUB, ear, end, field, listen, only, station, values  # fixtures among them
-from street import CTRL_STATUS, PAUSE, SETPOINT, bits, is_sound
+from street import CHARGE, CTRL_STATUS, PAUSE, SETPOINT, bits, is_sound
 
 LINE = re.compile(r'^ts=\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z level=(error|warning|info|debug) event=[a-z0-9_-]+'
                   r'( [a-zA-Z0-9_]+=([^" ]+|"([^"\\]|\\.)*"))*$')
@@ -45,18 +45,21 @@ def test_vehicles_charge_by_its_plans_within_the_limit_of_the_command_line(stati
     assert sum(one.told_da for one in street_.connectors) * 69 <= 22000
 
 
-def test_sigterm_tells_every_connector_three_times_to_pause_with_no_fallback_current(station, field, ear):
+def test_sigterm_tells_every_connector_three_times_to_use_its_fallback_current(station, field, ear):
     street_ = field()
     running = station()
-    wait_until(lambda: any(one.told_da for one in street_.connectors), "charging")
+    # 6 A on three phases are 4140 W: the failsafe limit of 11 kW carries two.
+    wait_until(lambda: sum(one.fallback_da for one in street_.connectors) == 120, "fallback currents")
+    listen(ear, 0.5)  # what came meanwhile: its socket may be full
     running.process.send_signal(signal.SIGTERM)
     heard = listen(ear, 2)
     assert running.finish() == 0
+    told = []
     for node in range(1, HUB + 1):
         last = [data for _, identifier, data in heard if identifier == SETPOINT << 6 | node][-3:]
-        assert [bits(data, 12, 4) for data in last] == [PAUSE] * 3
-        assert [bits(data, 16, 16) + bits(data, 40, 8) for data in last] == [0] * 3
+        told.append({(bits(data, 12, 4), bits(data, 16, 16), bits(data, 40, 8) * 5) for data in last})
         assert [(second[1] - first[1]) % 16 for first, second in pairwise(last)] == [1, 1]
+    assert sorted(told, key=str) == [{(PAUSE, 0, 0)}] * 6 + [{(CHARGE, 60, 60)}] * 2
     assert running.lines[-1].endswith("event=stop reason=signal")
 
 
