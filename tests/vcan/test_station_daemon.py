@@ -89,6 +89,7 @@ def test_ticks_that_it_slept_through_are_counted_and_not_made_up_for(station, ea
     running.process.send_signal(signal.SIGCONT)
     overrun = values(running.wait_for("event=overrun").string)
     assert int(overrun["missed_ticks"]) in (2, 3)
+    assert int(values(running.wait_for("event=tick_overrun").string)["ms"]) == int(overrun["missed_ticks"]) * 1000
     assert len(only(listen(ear, 0.5), CTRL_STATUS)) <= 2
 
 
@@ -150,6 +151,16 @@ def test_the_service_manager_hears_of_start_life_and_stop(station, tmp_path, abs
     assert max(after - before for before, after in pairwise(kicks)) < 2.0
 
 
+def test_a_daemon_that_is_late_with_every_tick_leaves_the_watchdog_to_bite(station, tmp_path):
+    with listening(str(tmp_path / "notify")) as manager:
+        running = station(before=("env", f"LD_PRELOAD={program('TAPER_LATE_CLOCK')}"),
+                          env=os.environ | {"NOTIFY_SOCKET": str(tmp_path / "notify"), "WATCHDOG_USEC": "2000000"})
+        for _ in range(4):
+            assert int(values(running.wait_for("event=tick_overrun").string)["ms"]) > 500
+        running.process.send_signal(signal.SIGTERM)
+        assert words_until(manager, "STOPPING=1").count("WATCHDOG=1") <= 2
+
+
 def test_a_watchdog_that_is_not_ours_is_not_kicked(station, tmp_path):
     with listening(str(tmp_path / "notify")) as manager:
         running = station(env=os.environ | {"NOTIFY_SOCKET": str(tmp_path / "notify"), "WATCHDOG_USEC": "2000000",
@@ -177,6 +188,18 @@ def test_every_line_of_the_log_is_logfmt_and_tells_what_happens(station, field):
     summary = values(running.lines[-2])
     assert summary["guard_violations"] == "0"
     assert int(summary["frames_received"]) > 100
+
+
+def test_the_log_tells_of_limits_that_flap_or_are_negative(station, field):
+    street_ = field(limit_w=60000)
+    running = station()
+    running.wait_for("event=mode mode=plan")
+    street_.limit_w = 40000
+    time.sleep(2)
+    street_.limit_w = 50000
+    running.wait_for("event=limit_flaps bus=0 node=62 before_W=40000$")
+    street_.limit_w = (0x10000 - 10) * 100
+    running.wait_for("event=limit_negative bus=0 node=62 limit_W=-1000$")
 
 
 def test_under_journald_each_line_begins_with_its_priority(station):
