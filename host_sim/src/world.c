@@ -161,19 +161,8 @@ static bool hand_over(world_t *world, int64_t now_s) {
     for (unsigned round = 1;
          sent && passed_ms <= end_ms && passed_ms < tick_ms && !taper_station_is_settled(&world->station);
          round++) {
-<<<<<<< HEAD
         const bool whole = round % 2 == 0 || passed_ms > world->reaction_ms + PATIENCE_ms;
         sent = run_round(world, now_s, passed_ms, whole);
-=======
-        const uint32_t now_ms = (uint32_t)((uint64_t)now_s * 1000U) + passed_ms;
-        sim_account_pass(&world->account, (double)now_s + (double)passed_ms / 1000.0);
-        taper_membus_set_time(&world->bus, now_ms);
-        sent = repeat_reports(world, now_s, passed_ms,
-                              round % 2 == 0 || passed_ms > world->reaction_ms + PATIENCE_ms);
-        taper_station_poll(&world->station, now_ms);
-        sim_fleet_hear(&world->fleet);
-        sim_account_obey(&world->account);
->>>>>>> w-results
         passed_ms = next_round_ms(world, passed_ms);
     }
     if (sent && tick_ms > VALIDITY_ms + passed_ms) { // a real station repeats its setpoints all the time
