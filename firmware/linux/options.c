@@ -28,9 +28,11 @@ static const char description[] =
     "runs a station on it again. What is there of these names is kept as FILE.old and FILE.station.old. A "
     "FILE that is a pipe or a device gets the frames only.\n"
     "\n"
-    "TIME SCALE: batteries, departures, the wall clock and planning steps run S times faster than the bus, "
-    "whose "
-    "periods and timeouts stay as they are. For simulated vehicles only.\n"
+    "TIME SCALE: batteries, departures, the wall clock, planning steps, and what vehicles and limits need "
+    "time "
+    "for run S times faster than the bus, whose periods and timeouts stay as they are. For simulated "
+    "vehicles "
+    "only.\n"
     "\n"
     "EXIT CODE: 0 stopped, 1 could not start or go on, 2 bad command line.\n";
 
