@@ -187,6 +187,7 @@ static void test_without_a_booking_three_phases_and_converters_count_on_all_line
         tree.connector[0].phases = 1;
         tree.connector[0].voltage_mV = 399001;
         tree.connector[0].efficiency_permille = 950;
+        assert_just_enough(&tree.supply.site_W, 11632); /* 690 W / 95 %: 727 W (726.3) */
         assert_just_enough(&tree.supply.phase_mA[line], 9792);
         /* 380 V, 95 %: 400 W per A, 580 permille (579.7) */
         tree.connector[0].voltage_mV = 380000;
@@ -198,9 +199,26 @@ static void test_a_booking_says_how_much_flows_for_an_ampere(void) {
     tree_add(&tree, 0, L1 | L2 | L3);
     tree.snapshot.demand[0].booking.permille = 612;
     tree.snapshot.demand[0].booking.W_per_A = 422;
+    tree.snapshot.demand[0].W_per_A = 400;
     give(0, 10000);
     assert_just_enough(&tree.group[0].limit_mA, 6120);
     assert_just_enough(&tree.supply.site_W, 4220);
+}
+
+static void test_no_less_power_counts_than_the_demand_draws_with_the_losses_of_a_converter(void) {
+    tree_add(&tree, 0, L1 | L2 | L3);
+    tree.snapshot.demand[0].booking.W_per_A = 422;
+    tree.connector[0].efficiency_permille = 950; /* of no account without a converter */
+    give(0, 10000);
+    tree.snapshot.demand[0].W_per_A = 423;
+    assert_just_enough(&tree.supply.site_W, 4230);
+    tree.connector[0].is_dc = true;
+    tree.snapshot.demand[0].W_per_A = 400; /* 421.05 W */
+    assert_just_enough(&tree.supply.site_W, 4220);
+    tree.snapshot.demand[0].W_per_A = 401; /* 422.1 W */
+    assert_just_enough(&tree.supply.site_W, 4230);
+    tree.snapshot.demand[0].W_per_A = 418; /* 440 W */
+    assert_just_enough(&tree.supply.site_W, 4400);
 }
 
 /** The three pairs, each after the other: currents of the one from `line` on, of the next, and of the one before. */
@@ -381,6 +399,7 @@ int main(void) {
     RUN_TEST(test_without_a_booking_the_description_says_the_lines);
     RUN_TEST(test_without_a_booking_three_phases_and_converters_count_on_all_lines);
     RUN_TEST(test_a_booking_says_how_much_flows_for_an_ampere);
+    RUN_TEST(test_no_less_power_counts_than_the_demand_draws_with_the_losses_of_a_converter);
     RUN_TEST(test_currents_of_two_pairs_add_as_phasors);
     RUN_TEST(test_pairs_of_a_group_count_in_those_above_it);
     RUN_TEST(test_other_currents_on_a_line_add_to_the_pairs_in_full);
