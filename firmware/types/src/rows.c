@@ -29,19 +29,16 @@ static place_t place_of(taper_row_kind_t kind) {
 
 int32_t taper_row_limit(const taper_station_config_t *config, uint8_t group, taper_row_kind_t kind) {
     const taper_group_config_t *limits = &config->groups[group];
+    const int32_t by_family[] = {[FAMILY_POWER] = limits->limit_W,
+                                 [FAMILY_LINE] = limits->limit_mA,
+                                 [FAMILY_DELTA] = limits->delta_mA,
+                                 [FAMILY_DIFFERENCE] = limits->imbalance_mA};
     const place_t place = place_of(kind);
-    if (place.second && !config->line_to_line) {
-        return TAPER_NO_LIMIT; /* would say the same as the first */
+    const int32_t limit = by_family[place.family];
+    if (limit == 0 || (place.second && !config->line_to_line)) {
+        return TAPER_NO_LIMIT; /* none, or one that would say the same as the first */
     }
-    int32_t limit = 0;
-    switch (place.family) {
-    case FAMILY_POWER: limit = limits->limit_W; break;
-    case FAMILY_LINE: limit = limits->limit_mA; break;
-    case FAMILY_DELTA: limit = limits->delta_mA; break;
-    case FAMILY_DIFFERENCE:
-    default: limit = limits->imbalance_mA; break;
-    }
-    return limit == 0 ? TAPER_NO_LIMIT : limit;
+    return limit;
 }
 
 int32_t taper_row_limit_now(const taper_station_config_t *config, const taper_supply_t *supply, uint8_t group,
@@ -101,17 +98,20 @@ static int32_t difference_permille(const taper_booking_t *booking, unsigned line
            (has_phase(booking, line + 1u) ? FULL_permille : 0);
 }
 
+static int32_t row_permille(const taper_booking_t *booking, place_t place) {
+    if (place.family == FAMILY_LINE) {
+        return line_permille(booking, place.line, place.second);
+    }
+    return place.family == FAMILY_DELTA ? delta_permille(booking, place.line, place.second)
+                                        : difference_permille(booking, place.line);
+}
+
 int32_t taper_row_weight(const taper_booking_t *booking, taper_row_kind_t kind) {
     const place_t place = place_of(kind);
-    int32_t permille = 0;
-    switch (place.family) {
-    case FAMILY_POWER: return booking->W_per_A;
-    case FAMILY_LINE: permille = line_permille(booking, place.line, place.second); break;
-    case FAMILY_DELTA: permille = delta_permille(booking, place.line, place.second); break;
-    case FAMILY_DIFFERENCE:
-    default: permille = difference_permille(booking, place.line); break;
+    if (place.family == FAMILY_POWER) {
+        return booking->W_per_A;
     }
-    const int64_t thousandths = (int64_t)permille * booking->permille;
+    const int64_t thousandths = (int64_t)row_permille(booking, place) * booking->permille;
     return (int32_t)((thousandths + (thousandths > 0 ? FULL_permille - 1 : 0)) /
                      FULL_permille); /* rounded up */
 }
@@ -174,13 +174,10 @@ taper_booking_t taper_booking_now(const taper_station_config_t *config, const ta
 
 bool taper_group_contains(const taper_station_config_t *config, uint8_t k, uint8_t i) {
     uint8_t group = config->connectors[i].group;
-    for (uint8_t depth = 0; depth < config->group_count && group != TAPER_NO_GROUP; depth++) {
-        if (group == k) {
-            return true;
-        }
+    while (group != k && group != TAPER_NO_GROUP) {
         group = config->groups[group].parent;
     }
-    return false;
+    return group == k;
 }
 
 bool taper_row_plans(const taper_station_config_t *config, uint8_t group, taper_row_kind_t kind, uint8_t i) {
