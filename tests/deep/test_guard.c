@@ -49,6 +49,21 @@ static void test_the_last_connector_is_looked_at_too(void) {
     tree_add(&tree, 0, L1);
     give(1, 32100);
     TEST_ASSERT_FALSE(tree_guard(&tree));
+    give(1, 0);
+    give(2, 32100); /* there is none */
+    TEST_ASSERT_TRUE(tree_guard(&tree));
+}
+
+static void test_where_there_is_no_room_not_even_the_least_may_flow(void) {
+    tree_add(&tree, 0, L1);
+    tree.snapshot.demand[0].min_mA = 0;
+    tree.snapshot.demand[0].W_per_A = 1;
+    tree.snapshot.demand[0].booking.W_per_A = 1;
+    tree.snapshot.demand[0].booking.permille = 1;
+    tree.group[0].limit_mA = 10;
+    give(0, 100); /* 0.1 W, 0.1 mA */
+    tree_assert_just_enough(&tree, &tree.supply.site_W, 1);
+    tree_assert_just_enough(&tree, &tree.supply.phase_mA[0], 1);
 }
 
 static void test_the_power_of_a_group_is_that_of_all_below_it(void) {
@@ -181,6 +196,10 @@ static void test_without_a_booking_three_phases_and_converters_count_on_all_line
         /* 380 V, 95 %: 400 W per A, 580 permille (579.7) */
         tree.connector[0].voltage_mV = 380000;
         tree_assert_just_enough(&tree, &tree.supply.phase_mA[line], 9280);
+        /* 345 V, no losses: half of 690 V */
+        tree.connector[0].voltage_mV = 345000;
+        tree.connector[0].efficiency_permille = 1000;
+        tree_assert_just_enough(&tree, &tree.supply.phase_mA[line], 8000);
     }
 }
 
@@ -201,6 +220,8 @@ static void test_no_less_power_counts_than_the_demand_draws_with_the_losses_of_a
     give(0, 10000);
     tree.snapshot.demand[0].W_per_A = 423;
     tree_assert_just_enough(&tree, &tree.supply.site_W, 4230);
+    tree.snapshot.demand[0].W_per_A = 2002;
+    tree_assert_just_enough(&tree, &tree.supply.site_W, 20020);
     tree.connector[0].is_dc = true;
     tree.snapshot.demand[0].W_per_A = 400; /* 421.05 W */
     tree_assert_just_enough(&tree, &tree.supply.site_W, 4220);
@@ -236,6 +257,7 @@ int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_a_current_is_within_its_connectors_and_its_vehicles_limits);
     RUN_TEST(test_the_last_connector_is_looked_at_too);
+    RUN_TEST(test_where_there_is_no_room_not_even_the_least_may_flow);
     RUN_TEST(test_the_power_of_a_group_is_that_of_all_below_it);
     RUN_TEST(test_a_group_without_a_limit_bounds_nothing);
     RUN_TEST(test_each_phase_of_a_group_has_its_own_sum);

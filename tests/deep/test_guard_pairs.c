@@ -146,7 +146,10 @@ static void test_no_limit_lets_100_kA_pass(void) {
     TEST_ASSERT_FALSE(tree_guard(&tree));
     tree.snapshot.demand[0].booking.permille = INT32_MAX;
     TEST_ASSERT_FALSE(tree_guard(&tree));
+    tree.group[0].limit_mA = 100500000;
+    TEST_ASSERT_FALSE(tree_guard(&tree));
     tree.group[0].limit_mA = 100000000;
+    TEST_ASSERT_FALSE(tree_guard(&tree));
     tree.snapshot.demand[0].booking.permille = 3124000;
     TEST_ASSERT_TRUE(tree_guard(&tree));
     tree.group[0].limit_mA = 0;

@@ -71,6 +71,7 @@ static void test_a_rotation_says_which_supply_phases_the_conductors_have(void) {
     TEST_ASSERT_EQUAL_UINT8(L2 | L1, taper_rotation_phases(TAPER_ROTATION_213, 2));
     TEST_ASSERT_EQUAL_UINT8(L3 | L2, taper_rotation_phases(TAPER_ROTATION_321, 2));
     TEST_ASSERT_EQUAL_UINT8(L1 | L2 | L3, taper_rotation_phases(TAPER_ROTATION_321, 3));
+    TEST_ASSERT_EQUAL_UINT8(L1 | L2 | L3, taper_rotation_phases(TAPER_ROTATION_321, 200));
     TEST_ASSERT_EQUAL_UINT8(L1, taper_rotation_phases(TAPER_ROTATION_UNKNOWN, 1));
     TEST_ASSERT_EQUAL_UINT8(L1 | L2, taper_rotation_phases((taper_rotation_t)99, 2));
 }

@@ -85,6 +85,10 @@ static void test_the_supply_bounds_what_the_site_has_limits_for(void) {
     TEST_ASSERT_EQUAL_INT32(0, taper_row_limit_now(&station, &supply, 0, TAPER_ROW_L2));
     TEST_ASSERT_EQUAL_INT32(200000, taper_row_limit_now(&station, &supply, 0, TAPER_ROW_L3));
     TEST_ASSERT_EQUAL_INT32(63000, taper_row_limit_now(&station, &supply, 2, TAPER_ROW_L1));
+    taper_station_config_t below_a_transformer = station;
+    below_a_transformer.groups = &groups[1];
+    TEST_ASSERT_EQUAL_INT32(90000, taper_row_limit_now(&below_a_transformer, &supply, 0, TAPER_ROW_DELTA_L2));
+    TEST_ASSERT_EQUAL_INT32(20000, taper_row_limit_now(&below_a_transformer, &supply, 0, TAPER_ROW_L2_L3));
     const taper_supply_t ample = taper_supply_of_W(90000);
     TEST_ASSERT_EQUAL_INT32(50000, taper_row_limit_now(&station, &ample, 0, TAPER_ROW_POWER));
 }
