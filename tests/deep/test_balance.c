@@ -239,6 +239,42 @@ static void test_a_cut_counts_by_what_flows_for_an_ampere(void) {
     TEST_ASSERT_EQUAL_INT32(16000, tree.setpoints.current_mA[0]);
 }
 
+static void test_of_a_rank_no_more_is_read_than_there_are_connectors(void) {
+    add(0, L1, 16000);
+    add(0, L1, 16000);
+    add(0, L1, 16000);
+    const uint8_t order[] = {1, 1, 1, 2};
+    memcpy(rank, order, sizeof order);
+    tree.group[0].imbalance_mA = 38000;
+    balance();
+    assert_currents(16000, 16000, 6000); /* 0 and 2 are not named: the last one first */
+}
+
+static void test_a_group_just_at_its_limit_does_not_hide_those_above(void) {
+    const uint8_t leaf = tree_add_group(&tree, 0);
+    add(leaf, L1, 10000);
+    add(0, L1, 20000);
+    tree.group[leaf].imbalance_mA = 10000;
+    tree.group[0].imbalance_mA = 25000;
+    balance();
+    TEST_ASSERT_EQUAL_INT32(10000, tree.setpoints.current_mA[0]);
+    TEST_ASSERT_EQUAL_INT32(15000, tree.setpoints.current_mA[1]);
+}
+
+static void test_the_least_current_and_the_least_excess_are_cut(void) {
+    add(0, L1, 1);
+    tree.snapshot.demand[0].min_mA = 0;
+    tree.snapshot.demand[0].booking.permille = 1001;
+    tree.group[0].imbalance_mA = 1; /* 1 uA less than it has */
+    balance();
+    TEST_ASSERT_EQUAL_INT32(0, tree.setpoints.current_mA[0]);
+    tree.setpoints.current_mA[0] = 32000;
+    tree.snapshot.demand[0].booking.permille = 1;
+    tree.group[0].imbalance_mA = 10;
+    balance();
+    TEST_ASSERT_EQUAL_INT32(10000, tree.setpoints.current_mA[0]);
+}
+
 /** Small cuts that groups within groups pass to and fro come to an end. */
 static void test_it_ends_in_a_deep_tree_whatever_is_asked(void) {
     static const uint8_t lines[] = {L1, L2, L3, L1 | L2, L2 | L3, L3 | L1, L1 | L2 | L3};
@@ -285,6 +321,9 @@ int main(void) {
     RUN_TEST(test_a_rank_that_names_nobody_or_one_twice_still_cuts);
     RUN_TEST(test_what_carries_nothing_is_no_help);
     RUN_TEST(test_a_cut_counts_by_what_flows_for_an_ampere);
+    RUN_TEST(test_of_a_rank_no_more_is_read_than_there_are_connectors);
+    RUN_TEST(test_a_group_just_at_its_limit_does_not_hide_those_above);
+    RUN_TEST(test_the_least_current_and_the_least_excess_are_cut);
     RUN_TEST(test_it_ends_in_a_deep_tree_whatever_is_asked);
     return UNITY_END();
 }

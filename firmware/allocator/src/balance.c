@@ -103,9 +103,8 @@ static void lower(balance_t *balance, tilt_t *tilt, uint8_t i) {
     const int32_t min_mA = balance->snapshot->demand[i].min_mA;
     const int32_t least_mA =
         (min_mA + TAPER_CURRENT_STEP_mA - 1) / TAPER_CURRENT_STEP_mA * TAPER_CURRENT_STEP_mA;
-    if (least_mA < balance->current_mA[i]) {
-        lower_to(balance, tilt, i, enough_mA > least_mA ? (int32_t)enough_mA : least_mA);
-    }
+    const int32_t lower_mA = taper_max_i32(taper_saturate_i32(enough_mA), least_mA);
+    lower_to(balance, tilt, i, taper_min_i32(lower_mA, balance->current_mA[i]));
 }
 
 static void switch_off(balance_t *balance, tilt_t *tilt, uint8_t i) {
@@ -116,16 +115,21 @@ static bool is_one_phase(const balance_t *balance, uint8_t i) {
     return (balance->phases[i] & (balance->phases[i] - 1u)) == 0u;
 }
 
-/** Cut those that help, from the last one up, first on one phase only, then on two. */
-static void cut(balance_t *balance, tilt_t *tilt, void (*how)(balance_t *, tilt_t *, uint8_t)) {
-    for (int pass = 0; pass < 2; pass++) {
-        for (uint8_t place = balance->config->connector_count; place-- > 0 && tilt->excess_uA > 0;) {
-            const uint8_t i = balance->order[place];
-            if (helps(balance, tilt, i) && is_one_phase(balance, i) == (pass == 0)) {
-                how(balance, tilt, i);
-            }
+typedef void cut_t(balance_t *balance, tilt_t *tilt, uint8_t i);
+
+/** Cut those on one phase, or on two, that help, from the last one up. */
+static void cut_those(balance_t *balance, tilt_t *tilt, bool one_phase, cut_t *how) {
+    for (uint8_t place = balance->config->connector_count; place-- > 0 && tilt->excess_uA > 0;) {
+        const uint8_t i = balance->order[place];
+        if (helps(balance, tilt, i) && is_one_phase(balance, i) == one_phase) {
+            how(balance, tilt, i);
         }
     }
+}
+
+static void cut(balance_t *balance, tilt_t *tilt, cut_t *how) {
+    cut_those(balance, tilt, true, how);
+    cut_those(balance, tilt, false, how);
 }
 
 static bool is_limited(const taper_station_config_t *config) {
