@@ -32,12 +32,23 @@ static const golden_t golden[] = {
      {690, 1000, 1000, 1000, 1000, 1000, 1000, 1733, 1733, 1733, 1733, 1733, 1733, 0, 0, 0}},
     {WIRED(460, L1 | L2),
      {460, 1000, 1000, 0, 1000, 1000, 0, 1000, 1733, 1000, 1000, 1733, 1000, 0, 1000, -1000}},
+    {WIRED(460, L2 | L3),
+     {460, 0, 1000, 1000, 0, 1000, 1000, 1000, 1000, 1733, 1000, 1000, 1733, -1000, 0, 1000}},
+    {WIRED(460, L3 | L1),
+     {460, 1000, 0, 1000, 1000, 0, 1000, 1733, 1000, 1000, 1733, 1000, 1000, 1000, -1000, 0}},
     {BETWEEN(208, L1 | L2), {208, 1000, 733, 0, 733, 1000, 0, 1000, 2000, 0, 0, 2000, 1000, 0, 1000, -1000}},
     {BETWEEN(208, L2 | L3), {208, 0, 1000, 733, 0, 733, 1000, 0, 1000, 2000, 1000, 0, 2000, -1000, 0, 1000}},
     {BETWEEN(208, L3 | L1), {208, 733, 0, 1000, 1000, 0, 733, 2000, 0, 1000, 2000, 1000, 0, 1000, -1000, 0}},
     /* Between two lines, but nobody knows which. */
     {BETWEEN(208, L1 | L2 | L3),
      {208, 1000, 1000, 1000, 1000, 1000, 1000, 2000, 2000, 2000, 2000, 2000, 2000, 0, 0, 0}},
+    /* Or just one is: it counts like one to neutral. */
+    {BETWEEN(208, L1), {208, 1000, 0, 0, 1000, 0, 0, 1000, 1000, 0, 1000, 1000, 0, 1000, 0, -1000}},
+    {BETWEEN(208, L2), {208, 0, 1000, 0, 0, 1000, 0, 0, 1000, 1000, 0, 1000, 1000, -1000, 1000, 0}},
+    {BETWEEN(208, L3), {208, 0, 0, 1000, 0, 0, 1000, 1000, 0, 1000, 1000, 0, 1000, 0, -1000, 1000}},
+    /* The least part of a permille is rounded up: 0.733 x 397 = 291.001. */
+    {{.W_per_A = 83, .permille = 397, .phases = L1 | L2, .line_to_line = true},
+     {83, 397, 292, 0, 292, 397, 0, 397, 794, 0, 0, 794, 397, 0, 397, -397}},
     /* 421.06 W draw 0.6103 A from each phase: sqrt(3) of it is rounded up. */
     {CONVERTER(422, 611), {422, 611, 611, 611, 611, 611, 611, 1059, 1059, 1059, 1059, 1059, 1059, 0, 0, 0}},
 };
@@ -60,6 +71,24 @@ static void test_only_differences_take_away(void) {
                 TEST_ASSERT_GREATER_OR_EQUAL_INT32(0, taper_row_weight(&booking, (taper_row_kind_t)kind));
             }
         }
+    }
+}
+
+static void test_every_rotation_has_a_phase_for_each_conductor(void) {
+    static const struct {
+        unsigned rotation;
+        uint8_t one, two;
+    } cases[] = {{TAPER_ROTATION_UNKNOWN, L1, L1 | L2}, {TAPER_ROTATION_123, L1, L1 | L2},
+                 {TAPER_ROTATION_231, L2, L2 | L3},     {TAPER_ROTATION_312, L3, L3 | L1},
+                 {TAPER_ROTATION_132, L1, L1 | L3},     {TAPER_ROTATION_213, L2, L2 | L1},
+                 {TAPER_ROTATION_321, L3, L3 | L2},     {TAPER_ROTATION_321 + 1, L1, L1 | L2}};
+    for (unsigned k = 0; k < sizeof cases / sizeof cases[0]; k++) {
+        const taper_rotation_t rotation = (taper_rotation_t)cases[k].rotation;
+        TEST_ASSERT_EQUAL_UINT8(0, taper_rotation_phases(rotation, 0));
+        TEST_ASSERT_EQUAL_UINT8(cases[k].one, taper_rotation_phases(rotation, 1));
+        TEST_ASSERT_EQUAL_UINT8(cases[k].two, taper_rotation_phases(rotation, 2));
+        TEST_ASSERT_EQUAL_UINT8(L1 | L2 | L3, taper_rotation_phases(rotation, 3));
+        TEST_ASSERT_EQUAL_UINT8(L1 | L2 | L3, taper_rotation_phases(rotation, 4));
     }
 }
 
@@ -199,6 +228,7 @@ int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_every_wiring_counts_as_written_down);
     RUN_TEST(test_only_differences_take_away);
+    RUN_TEST(test_every_rotation_has_a_phase_for_each_conductor);
     RUN_TEST(test_a_rotation_says_which_supply_phases_the_conductors_have);
     RUN_TEST(test_no_row_falls_short_of_the_phasors);
     RUN_TEST(test_line_rows_are_exact_for_each_pair_alone_and_for_two_alike);

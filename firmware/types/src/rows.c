@@ -63,7 +63,7 @@ static bool has_phase(const taper_booking_t *booking, unsigned phase) {
 
 /** The first phase of the pair that a line-to-line connector is between; 3: it is not between a pair. */
 static unsigned pair_of(const taper_booking_t *booking) {
-    static const uint8_t pairs[8] = {3, 3, 3, 0, 3, 2, 1, 3};
+    static const uint8_t pairs[] = {3, 3, 3, 0, 3, 2, 1, 3};
     return booking->line_to_line ? pairs[booking->phases & 7u] : 3u;
 }
 
@@ -112,19 +112,17 @@ int32_t taper_row_weight(const taper_booking_t *booking, taper_row_kind_t kind) 
         return booking->W_per_A;
     }
     const int64_t thousandths = (int64_t)row_permille(booking, place) * booking->permille;
-    return (int32_t)((thousandths + (thousandths > 0 ? FULL_permille - 1 : 0)) /
-                     FULL_permille); /* rounded up */
+    const int64_t part = thousandths % FULL_permille > 0 ? 1 : 0; /* rounded up */
+    return (int32_t)(thousandths / FULL_permille + part);
 }
 
 uint8_t taper_rotation_phases(taper_rotation_t rotation, uint8_t conductors) {
-    /* Supply phase of conductors L1, L2, L3 by rotation; one that is not known counts as straight. */
-    static const uint8_t order[7][3] = {{0, 1, 2}, {0, 1, 2}, {1, 2, 0}, {2, 0, 1},
-                                        {0, 2, 1}, {1, 0, 2}, {2, 1, 0}};
-    unsigned mask = 0;
-    for (uint8_t k = 0; k < conductors && k < 3; k++) {
-        mask |= 1u << order[(unsigned)rotation < 7u ? rotation : 0][k];
-    }
-    return (uint8_t)mask;
+    /* By rotation, of none to three conductors; one that is not known counts as straight. */
+    static const uint8_t masks[][4] = {{0, 1, 3, 7}, {0, 1, 3, 7}, {0, 2, 6, 7}, {0, 4, 5, 7},
+                                       {0, 1, 5, 7}, {0, 2, 3, 7}, {0, 4, 6, 7}};
+    const unsigned known =
+        (unsigned)rotation < sizeof masks / sizeof masks[0] ? rotation : TAPER_ROTATION_UNKNOWN;
+    return masks[known][taper_min_i32(conductors, 3)];
 }
 
 static int32_t whole_V(int32_t voltage_mV) {
@@ -213,10 +211,10 @@ static bool implies(const taper_station_config_t *config, uint8_t group, taper_r
     return !equal || other < kind;
 }
 
-/** Whether another line of the group says as much. Not at the site: its lines differ by what else it draws. */
+/** Whether another line of the group says as much; no difference does. Not at the site: its lines differ by what else it draws. */
 static bool is_implied(const taper_station_config_t *config, uint8_t group, taper_row_kind_t kind) {
     const place_t place = place_of(kind);
-    for (int other = 0; group != 0 && other < TAPER_ROW_SUMS; other++) {
+    for (int other = TAPER_ROW_L1; group != 0 && other < TAPER_ROW_SUMS; other++) {
         const bool is_alike = place_of((taper_row_kind_t)other).family == place.family &&
                               taper_row_limit(config, group, (taper_row_kind_t)other) != TAPER_NO_LIMIT;
         if (is_alike && other != (int)kind && implies(config, group, (taper_row_kind_t)other, kind)) {
@@ -228,5 +226,5 @@ static bool is_implied(const taper_station_config_t *config, uint8_t group, tape
 
 bool taper_row_is_planned(const taper_station_config_t *config, uint8_t group, taper_row_kind_t kind) {
     return taper_row_limit(config, group, kind) != TAPER_NO_LIMIT && has_members(config, group, kind) &&
-           (kind >= TAPER_ROW_SUMS || !is_implied(config, group, kind));
+           !is_implied(config, group, kind);
 }
