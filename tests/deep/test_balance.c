@@ -162,6 +162,51 @@ static void test_a_pair_that_is_on_the_weak_phase_too_is_no_help(void) {
     assert_currents(10000, 16000, 20000); /* 26, 20, 16 */
 }
 
+static void test_who_is_on_the_weak_phase_too_stays_where_others_go_off(void) {
+    add(0, L1, 16000);
+    add(0, L1 | L3, 16000);
+    add(0, L2, 20000); /* 32, 20, 16 */
+    tree.group[0].imbalance_mA = 4000;
+    balance();
+    assert_currents(0, 16000, 20000);
+}
+
+static void test_of_phases_alike_the_first_is_the_strongest(void) {
+    add(0, L1 | L2, 16000);
+    add(0, L1, 10000);
+    add(0, L2, 10000); /* 26, 26, 0 */
+    tree.snapshot.demand[2].min_mA = 0;
+    tree.group[0].imbalance_mA = 20000;
+    balance(); /* L1 first: what its pair loses, the other on L2 keeps */
+    assert_currents(14000, 6000, 6000);
+}
+
+static void test_of_phases_alike_the_first_is_the_weakest(void) {
+    add(0, L1 | L2, 16000);
+    add(0, L1, 10000);
+    add(0, L3, 16000); /* 26, 16, 16 */
+    tree.snapshot.demand[1].min_mA = 10000;
+    tree.group[0].imbalance_mA = 6000;
+    balance();
+    assert_currents(16000, 0, 16000);
+}
+
+/** A feeder whose three phases are to be alike, and a site that cuts one of them by a step, again and again. */
+static void test_small_cuts_passed_to_and_fro_end_in_switching_off(void) {
+    const uint8_t leaf = tree_add_group(&tree, 0);
+    add(0, L2, 10000);
+    add(0, L3, 6000);
+    add(leaf, L1, 20000);
+    add(leaf, L2, 20000);
+    add(leaf, L3, 20000);
+    tree.group[leaf].imbalance_mA = 1;
+    tree.group[0].imbalance_mA = 9900;
+    balance();
+    assert_currents(0, 6000, 0);
+    TEST_ASSERT_EQUAL_INT32(0, tree.setpoints.current_mA[3]);
+    TEST_ASSERT_EQUAL_INT32(0, tree.setpoints.current_mA[4]);
+}
+
 static void test_three_phases_are_never_cut(void) {
     add(0, L1 | L2 | L3, 32000);
     add(0, L2, 32000);
@@ -239,6 +284,42 @@ static void test_a_cut_counts_by_what_flows_for_an_ampere(void) {
     TEST_ASSERT_EQUAL_INT32(16000, tree.setpoints.current_mA[0]);
 }
 
+static void test_of_a_rank_no_more_is_read_than_there_are_connectors(void) {
+    add(0, L1, 16000);
+    add(0, L1, 16000);
+    add(0, L1, 16000);
+    const uint8_t order[] = {1, 1, 1, 2};
+    memcpy(rank, order, sizeof order);
+    tree.group[0].imbalance_mA = 38000;
+    balance();
+    assert_currents(16000, 16000, 6000); /* 0 and 2 are not named: the last one first */
+}
+
+static void test_a_group_just_at_its_limit_does_not_hide_those_above(void) {
+    const uint8_t leaf = tree_add_group(&tree, 0);
+    add(leaf, L1, 10000);
+    add(0, L1, 20000);
+    tree.group[leaf].imbalance_mA = 10000;
+    tree.group[0].imbalance_mA = 25000;
+    balance();
+    TEST_ASSERT_EQUAL_INT32(10000, tree.setpoints.current_mA[0]);
+    TEST_ASSERT_EQUAL_INT32(15000, tree.setpoints.current_mA[1]);
+}
+
+static void test_the_least_current_and_the_least_excess_are_cut(void) {
+    add(0, L1, 1);
+    tree.snapshot.demand[0].min_mA = 0;
+    tree.snapshot.demand[0].booking.permille = 1001;
+    tree.group[0].imbalance_mA = 1; /* 1 uA less than it has */
+    balance();
+    TEST_ASSERT_EQUAL_INT32(0, tree.setpoints.current_mA[0]);
+    tree.setpoints.current_mA[0] = 32000;
+    tree.snapshot.demand[0].booking.permille = 1;
+    tree.group[0].imbalance_mA = 10;
+    balance();
+    TEST_ASSERT_EQUAL_INT32(10000, tree.setpoints.current_mA[0]);
+}
+
 /** Small cuts that groups within groups pass to and fro come to an end. */
 static void test_it_ends_in_a_deep_tree_whatever_is_asked(void) {
     static const uint8_t lines[] = {L1, L2, L3, L1 | L2, L2 | L3, L3 | L1, L1 | L2 | L3};
@@ -279,12 +360,19 @@ int main(void) {
     RUN_TEST(test_without_a_minimum_currents_go_down_to_nothing);
     RUN_TEST(test_one_phase_is_cut_before_two);
     RUN_TEST(test_a_pair_that_is_on_the_weak_phase_too_is_no_help);
+    RUN_TEST(test_who_is_on_the_weak_phase_too_stays_where_others_go_off);
+    RUN_TEST(test_of_phases_alike_the_first_is_the_strongest);
+    RUN_TEST(test_of_phases_alike_the_first_is_the_weakest);
+    RUN_TEST(test_small_cuts_passed_to_and_fro_end_in_switching_off);
     RUN_TEST(test_three_phases_are_never_cut);
     RUN_TEST(test_each_group_is_balanced_by_its_own_connectors);
     RUN_TEST(test_what_balances_the_site_may_tilt_a_feeder_and_both_hold_in_the_end);
     RUN_TEST(test_a_rank_that_names_nobody_or_one_twice_still_cuts);
     RUN_TEST(test_what_carries_nothing_is_no_help);
     RUN_TEST(test_a_cut_counts_by_what_flows_for_an_ampere);
+    RUN_TEST(test_of_a_rank_no_more_is_read_than_there_are_connectors);
+    RUN_TEST(test_a_group_just_at_its_limit_does_not_hide_those_above);
+    RUN_TEST(test_the_least_current_and_the_least_excess_are_cut);
     RUN_TEST(test_it_ends_in_a_deep_tree_whatever_is_asked);
     return UNITY_END();
 }

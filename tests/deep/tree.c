@@ -93,6 +93,16 @@ bool tree_guard(const tree_t *tree) {
     return taper_guard_passes(&tree->config, &tree->snapshot, &tree->supply, &tree->setpoints);
 }
 
+void tree_assert_just_enough(const tree_t *tree, int32_t *limit, int32_t enough) {
+    *limit = enough;
+    TEST_ASSERT_TRUE(tree_guard(tree));
+    *limit = enough - 1;
+    TEST_ASSERT_FALSE(tree_guard(tree));
+    *limit = enough + 1;
+    TEST_ASSERT_TRUE(tree_guard(tree));
+    *limit = enough;
+}
+
 int32_t tree_allocate(tree_t *tree) {
     taper_allocate(&tree->allocator, &tree->config, &tree->snapshot, &tree->proposal, &tree->supply, NULL,
                    &tree->setpoints);

@@ -49,6 +49,9 @@ int32_t tree_allocate_after(tree_t *tree, uint32_t ms);
 /** Whether the guard passes the setpoints. */
 bool tree_guard(const tree_t *tree);
 
+/** For the guard `limit`, one of the tree's, is just enough: one less is not. It stays at that. */
+void tree_assert_just_enough(const tree_t *tree, int32_t *limit, int32_t enough);
+
 /** Next value of a small fixed pseudo-random generator (xorshift32), below `bound`. */
 uint32_t tree_random(uint32_t *state, uint32_t bound);
 

@@ -1,8 +1,8 @@
 /* Imbalance cannot be kept by rooms: what one phase may have depends on what the others get. So it comes last. */
-#include <string.h>
-
 #include "taper/allocator.h"
 #include "taper/rows.h"
+
+#define PHASES 3u
 
 typedef struct {
     const taper_station_config_t *config;
@@ -38,11 +38,11 @@ static void order_all(balance_t *balance, const uint8_t *rank) {
     }
 }
 
-static void sum_phases(const balance_t *balance, int64_t sum_uA[TAPER_MAX_GROUPS][3]) {
+/** Add all currents to `sum_uA`, which is 0, by group and phase. */
+static void sum_phases(const balance_t *balance, int64_t sum_uA[TAPER_MAX_GROUPS][PHASES]) {
     const taper_station_config_t *config = balance->config;
-    memset(sum_uA, 0, sizeof(int64_t[TAPER_MAX_GROUPS][3]));
     for (uint8_t i = 0; i < config->connector_count; i++) {
-        for (unsigned phase = 0; phase < 3; phase++) {
+        for (unsigned phase = 0; phase < PHASES; phase++) {
             if ((balance->phases[i] >> phase & 1u) != 0u) {
                 sum_uA[config->connectors[i].group][phase] +=
                     (int64_t)balance->current_mA[i] * balance->permille[i];
@@ -50,7 +50,7 @@ static void sum_phases(const balance_t *balance, int64_t sum_uA[TAPER_MAX_GROUPS
         }
     }
     for (uint8_t k = config->group_count; k-- > 1;) { /* children stand behind their parents */
-        for (unsigned phase = 0; phase < 3; phase++) {
+        for (unsigned phase = 0; phase < PHASES; phase++) {
             sum_uA[config->groups[k].parent][phase] += sum_uA[k][phase];
         }
     }
@@ -59,7 +59,7 @@ static void sum_phases(const balance_t *balance, int64_t sum_uA[TAPER_MAX_GROUPS
 static tilt_t tilt_of(const taper_station_config_t *config, uint8_t k, const int64_t *sum_uA) {
     unsigned strong = 0;
     unsigned weak = 0;
-    for (unsigned phase = 1; phase < 3; phase++) {
+    for (unsigned phase = 1; phase < PHASES; phase++) {
         strong = sum_uA[phase] > sum_uA[strong] ? phase : strong;
         weak = sum_uA[phase] < sum_uA[weak] ? phase : weak;
     }
@@ -72,7 +72,7 @@ static tilt_t tilt_of(const taper_station_config_t *config, uint8_t k, const int
 
 /** The first group from the leaves up that tilts: what helps it may help those above. */
 static tilt_t find_tilt(const balance_t *balance) {
-    int64_t sum_uA[TAPER_MAX_GROUPS][3];
+    int64_t sum_uA[TAPER_MAX_GROUPS][PHASES] = {0};
     sum_phases(balance, sum_uA);
     for (uint8_t k = balance->config->group_count; k-- > 0;) {
         const tilt_t tilt = tilt_of(balance->config, k, sum_uA[k]);
@@ -103,9 +103,8 @@ static void lower(balance_t *balance, tilt_t *tilt, uint8_t i) {
     const int32_t min_mA = balance->snapshot->demand[i].min_mA;
     const int32_t least_mA =
         (min_mA + TAPER_CURRENT_STEP_mA - 1) / TAPER_CURRENT_STEP_mA * TAPER_CURRENT_STEP_mA;
-    if (least_mA < balance->current_mA[i]) {
-        lower_to(balance, tilt, i, enough_mA > least_mA ? (int32_t)enough_mA : least_mA);
-    }
+    const int32_t lower_mA = taper_max_i32(taper_saturate_i32(enough_mA), least_mA);
+    lower_to(balance, tilt, i, taper_min_i32(lower_mA, balance->current_mA[i]));
 }
 
 static void switch_off(balance_t *balance, tilt_t *tilt, uint8_t i) {
@@ -116,32 +115,25 @@ static bool is_one_phase(const balance_t *balance, uint8_t i) {
     return (balance->phases[i] & (balance->phases[i] - 1u)) == 0u;
 }
 
-/** Cut those that help, from the last one up, first on one phase only, then on two. */
-static void cut(balance_t *balance, tilt_t *tilt, void (*how)(balance_t *, tilt_t *, uint8_t)) {
-    for (int pass = 0; pass < 2; pass++) {
-        for (uint8_t place = balance->config->connector_count; place-- > 0 && tilt->excess_uA > 0;) {
-            const uint8_t i = balance->order[place];
-            if (helps(balance, tilt, i) && is_one_phase(balance, i) == (pass == 0)) {
-                how(balance, tilt, i);
-            }
+typedef void cut_t(balance_t *balance, tilt_t *tilt, uint8_t i);
+
+/** Cut those on one phase, or on two, that help, from the last one up. */
+static void cut_those(balance_t *balance, tilt_t *tilt, bool one_phase, cut_t *how) {
+    for (uint8_t place = balance->config->connector_count; place-- > 0 && tilt->excess_uA > 0;) {
+        const uint8_t i = balance->order[place];
+        if (helps(balance, tilt, i) && is_one_phase(balance, i) == one_phase) {
+            how(balance, tilt, i);
         }
     }
 }
 
-static bool is_limited(const taper_station_config_t *config) {
-    for (uint8_t k = 0; k < config->group_count; k++) {
-        if (taper_row_limit(config, k, TAPER_ROW_L1_L2) != TAPER_NO_LIMIT) {
-            return true;
-        }
-    }
-    return false;
+static void cut(balance_t *balance, tilt_t *tilt, cut_t *how) {
+    cut_those(balance, tilt, true, how);
+    cut_those(balance, tilt, false, how);
 }
 
 void taper_balance(const taper_station_config_t *config, const taper_snapshot_t *snapshot,
                    const uint8_t *rank, taper_setpoints_t *setpoints) {
-    if (!is_limited(config)) {
-        return;
-    }
     balance_t balance = {.config = config, .snapshot = snapshot, .current_mA = setpoints->current_mA};
     order_all(&balance, rank);
     for (uint8_t i = 0; i < config->connector_count; i++) {

@@ -17,12 +17,11 @@ typedef struct {
 
 static bool connector_passes(const taper_connector_config_t *connector, const taper_demand_t *demand,
                              int32_t current_mA) {
-    if (current_mA == 0) {
-        return true;
+    if (current_mA <= 0) {
+        return current_mA == 0;
     }
-    return demand->active && current_mA > 0 && current_mA <= connector->max_mA &&
-           current_mA <= demand->max_mA && current_mA >= demand->min_mA &&
-           current_mA % TAPER_CURRENT_STEP_mA == 0;
+    return demand->active && current_mA <= connector->max_mA && current_mA <= demand->max_mA &&
+           current_mA >= demand->min_mA && current_mA % TAPER_CURRENT_STEP_mA == 0;
 }
 
 static int64_t quotient_up(int64_t dividend, int64_t divisor) {
@@ -176,10 +175,8 @@ bool taper_guard_passes(const taper_station_config_t *config, const taper_snapsh
         if (!connector_passes(&config->connectors[i], &snapshot->demand[i], current_mA)) {
             return false;
         }
-        if (current_mA > 0) {
-            const taper_booking_t booking = booking_of(config, &snapshot->demand[i], i);
-            add_current(&load[config->connectors[i].group], &booking, current_mA);
-        }
+        const taper_booking_t booking = booking_of(config, &snapshot->demand[i], i);
+        add_current(&load[config->connectors[i].group], &booking, current_mA);
     }
     for (uint8_t k = config->group_count; k-- > 0;) { /* children stand behind their parents */
         if (!load_passes(&config->groups[k], &load[k], k == 0 ? supply->phase_mA : as_described)) {

@@ -21,7 +21,7 @@ static int64_t battery_takes_W(const taper_demand_t *demand) {
         return demand->peak_W;
     }
     const int64_t fall_W = (int64_t)demand->taper_W * demand->stored_Wh / demand->capacity_Wh;
-    return fall_W < demand->peak_W ? demand->peak_W - fall_W : 0;
+    return demand->peak_W - at_most(fall_W, demand->peak_W);
 }
 
 /** What the vehicle draws at most until the next tick, whatever it is offered [mW]. */
@@ -70,7 +70,7 @@ void taper_turns_begin(taper_allocator_t *allocator, const taper_station_config_
         const taper_demand_t *demand = &snapshot->demand[i];
         taper_turn_t *turn = &allocator->turn[i];
         if (!demand->active || turn->session != demand->session) {
-            *turn = (taper_turn_t){.session = demand->active ? demand->session : 0};
+            *turn = (taper_turn_t){.session = demand->session};
         } else {
             book(turn, config, demand, passed_ms);
         }
@@ -102,9 +102,9 @@ static bool is_due(const taper_turn_t *turn, const taper_station_config_t *confi
 static bool calls_for_minimum(const taper_turn_t *turn, const taper_station_config_t *config,
                               const taper_snapshot_t *snapshot, const taper_proposal_t *proposal, uint8_t i) {
     const taper_demand_t *demand = &snapshot->demand[i];
-    const int64_t wished_mW = wish_mW(proposal, i);
-    return held(turn, true, snapshot->now_ms, config->min_on_ms) || wished_mW >= minimum_mW(demand) ||
-           (wished_mW > 0 && is_due(turn, config, demand));
+    return held(turn, true, snapshot->now_ms, config->min_on_ms) ||
+           wish_mW(proposal, i) >= minimum_mW(demand) ||
+           (proposal->wish_W[i] > 0 && is_due(turn, config, demand));
 }
 
 /** Whether the ceiling has room for what the minimum makes the vehicle draw, but for a step that rounding cost. */

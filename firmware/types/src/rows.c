@@ -29,19 +29,16 @@ static place_t place_of(taper_row_kind_t kind) {
 
 int32_t taper_row_limit(const taper_station_config_t *config, uint8_t group, taper_row_kind_t kind) {
     const taper_group_config_t *limits = &config->groups[group];
+    const int32_t by_family[] = {[FAMILY_POWER] = limits->limit_W,
+                                 [FAMILY_LINE] = limits->limit_mA,
+                                 [FAMILY_DELTA] = limits->delta_mA,
+                                 [FAMILY_DIFFERENCE] = limits->imbalance_mA};
     const place_t place = place_of(kind);
-    if (place.second && !config->line_to_line) {
-        return TAPER_NO_LIMIT; /* would say the same as the first */
+    const int32_t limit = by_family[place.family];
+    if (limit == 0 || (place.second && !config->line_to_line)) {
+        return TAPER_NO_LIMIT; /* none, or one that would say the same as the first */
     }
-    int32_t limit = 0;
-    switch (place.family) {
-    case FAMILY_POWER: limit = limits->limit_W; break;
-    case FAMILY_LINE: limit = limits->limit_mA; break;
-    case FAMILY_DELTA: limit = limits->delta_mA; break;
-    case FAMILY_DIFFERENCE:
-    default: limit = limits->imbalance_mA; break;
-    }
-    return limit == 0 ? TAPER_NO_LIMIT : limit;
+    return limit;
 }
 
 int32_t taper_row_limit_now(const taper_station_config_t *config, const taper_supply_t *supply, uint8_t group,
@@ -66,7 +63,7 @@ static bool has_phase(const taper_booking_t *booking, unsigned phase) {
 
 /** The first phase of the pair that a line-to-line connector is between; 3: it is not between a pair. */
 static unsigned pair_of(const taper_booking_t *booking) {
-    static const uint8_t pairs[8] = {3, 3, 3, 0, 3, 2, 1, 3};
+    static const uint8_t pairs[] = {3, 3, 3, 0, 3, 2, 1, 3};
     return booking->line_to_line ? pairs[booking->phases & 7u] : 3u;
 }
 
@@ -101,30 +98,31 @@ static int32_t difference_permille(const taper_booking_t *booking, unsigned line
            (has_phase(booking, line + 1u) ? FULL_permille : 0);
 }
 
+static int32_t row_permille(const taper_booking_t *booking, place_t place) {
+    if (place.family == FAMILY_LINE) {
+        return line_permille(booking, place.line, place.second);
+    }
+    return place.family == FAMILY_DELTA ? delta_permille(booking, place.line, place.second)
+                                        : difference_permille(booking, place.line);
+}
+
 int32_t taper_row_weight(const taper_booking_t *booking, taper_row_kind_t kind) {
     const place_t place = place_of(kind);
-    int32_t permille = 0;
-    switch (place.family) {
-    case FAMILY_POWER: return booking->W_per_A;
-    case FAMILY_LINE: permille = line_permille(booking, place.line, place.second); break;
-    case FAMILY_DELTA: permille = delta_permille(booking, place.line, place.second); break;
-    case FAMILY_DIFFERENCE:
-    default: permille = difference_permille(booking, place.line); break;
+    if (place.family == FAMILY_POWER) {
+        return booking->W_per_A;
     }
-    const int64_t thousandths = (int64_t)permille * booking->permille;
-    return (int32_t)((thousandths + (thousandths > 0 ? FULL_permille - 1 : 0)) /
-                     FULL_permille); /* rounded up */
+    const int64_t thousandths = (int64_t)row_permille(booking, place) * booking->permille;
+    const int64_t part = thousandths % FULL_permille > 0 ? 1 : 0; /* rounded up */
+    return (int32_t)(thousandths / FULL_permille + part);
 }
 
 uint8_t taper_rotation_phases(taper_rotation_t rotation, uint8_t conductors) {
-    /* Supply phase of conductors L1, L2, L3 by rotation; one that is not known counts as straight. */
-    static const uint8_t order[7][3] = {{0, 1, 2}, {0, 1, 2}, {1, 2, 0}, {2, 0, 1},
-                                        {0, 2, 1}, {1, 0, 2}, {2, 1, 0}};
-    unsigned mask = 0;
-    for (uint8_t k = 0; k < conductors && k < 3; k++) {
-        mask |= 1u << order[(unsigned)rotation < 7u ? rotation : 0][k];
-    }
-    return (uint8_t)mask;
+    /* By rotation, of none to three conductors; one that is not known counts as straight. */
+    static const uint8_t masks[][4] = {{0, 1, 3, 7}, {0, 1, 3, 7}, {0, 2, 6, 7}, {0, 4, 5, 7},
+                                       {0, 1, 5, 7}, {0, 2, 3, 7}, {0, 4, 6, 7}};
+    const unsigned known =
+        (unsigned)rotation < sizeof masks / sizeof masks[0] ? rotation : TAPER_ROTATION_UNKNOWN;
+    return masks[known][taper_min_i32(conductors, 3)];
 }
 
 static int32_t whole_V(int32_t voltage_mV) {
@@ -174,13 +172,10 @@ taper_booking_t taper_booking_now(const taper_station_config_t *config, const ta
 
 bool taper_group_contains(const taper_station_config_t *config, uint8_t k, uint8_t i) {
     uint8_t group = config->connectors[i].group;
-    for (uint8_t depth = 0; depth < config->group_count && group != TAPER_NO_GROUP; depth++) {
-        if (group == k) {
-            return true;
-        }
+    while (group != k && group != TAPER_NO_GROUP) {
         group = config->groups[group].parent;
     }
-    return false;
+    return group == k;
 }
 
 bool taper_row_plans(const taper_station_config_t *config, uint8_t group, taper_row_kind_t kind, uint8_t i) {
@@ -216,10 +211,10 @@ static bool implies(const taper_station_config_t *config, uint8_t group, taper_r
     return !equal || other < kind;
 }
 
-/** Whether another line of the group says as much. Not at the site: its lines differ by what else it draws. */
+/** Whether another line of the group says as much; no difference does. Not at the site: its lines differ by what else it draws. */
 static bool is_implied(const taper_station_config_t *config, uint8_t group, taper_row_kind_t kind) {
     const place_t place = place_of(kind);
-    for (int other = 0; group != 0 && other < TAPER_ROW_SUMS; other++) {
+    for (int other = TAPER_ROW_L1; group != 0 && other < TAPER_ROW_SUMS; other++) {
         const bool is_alike = place_of((taper_row_kind_t)other).family == place.family &&
                               taper_row_limit(config, group, (taper_row_kind_t)other) != TAPER_NO_LIMIT;
         if (is_alike && other != (int)kind && implies(config, group, (taper_row_kind_t)other, kind)) {
@@ -231,5 +226,5 @@ static bool is_implied(const taper_station_config_t *config, uint8_t group, tape
 
 bool taper_row_is_planned(const taper_station_config_t *config, uint8_t group, taper_row_kind_t kind) {
     return taper_row_limit(config, group, kind) != TAPER_NO_LIMIT && has_members(config, group, kind) &&
-           (kind >= TAPER_ROW_SUMS || !is_implied(config, group, kind));
+           !is_implied(config, group, kind);
 }

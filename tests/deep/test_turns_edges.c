@@ -1,0 +1,96 @@
+/* Turns at their edges: the least battery, power, minimum and debt, and what belongs to nobody. */
+#include <string.h>
+
+#include "tree.h"
+#include "turns.h"
+#include "unity.h"
+
+static tree_t tree;
+
+void setUp(void) {
+    tree_init(&tree);
+}
+void tearDown(void) {}
+
+static void test_who_stands_beyond_the_last_connector_has_no_turn(void) {
+    static const taper_turn_t none;
+    tree_start(&tree, 3, 3);
+    tree.config.connector_count = tree.snapshot.count = 2;
+    tree_allocate(&tree);
+    tree_allocate_after(&tree, 1000);
+    TEST_ASSERT_EQUAL_INT32(0, tree.setpoints.current_mA[2]);
+    TEST_ASSERT_EQUAL_MEMORY(&none, &tree.allocator.turn[2], sizeof none);
+}
+
+static void test_the_least_battery_that_is_full_takes_nothing(void) {
+    tree_start(&tree, 2, 1);
+    taper_demand_t *full = &tree.snapshot.demand[0];
+    full->departs_in_s = -100000;
+    full->peak_W = full->taper_W = 7000;
+    full->capacity_Wh = full->stored_Wh = 1;
+    tree_allocate(&tree);
+    tree_assert_on(&tree, "1");
+}
+
+static void test_who_takes_a_watt_can_charge(void) {
+    tree_start(&tree, 2, 1);
+    tree.snapshot.demand[0].peak_W = 1;
+    tree.snapshot.demand[0].need_Wh = 1; /* an hour */
+    tree.snapshot.demand[0].departs_in_s = 0;
+    tree_laxity(&tree, 1, -3599);
+    tree_allocate(&tree);
+    tree_assert_on(&tree, "0");
+}
+
+static void test_the_least_minimum_needs_a_turn(void) {
+    tree_start(&tree, 1, 1);
+    tree.snapshot.demand[0].min_mA = 1;
+    TEST_ASSERT_EQUAL_INT32(6000, tree_allocate(&tree));
+}
+
+static void test_who_is_on_stays_for_the_last_of_what_it_is_owed(void) {
+    for (int64_t owed_mWs = 0; owed_mWs < 2; owed_mWs++) {
+        tree_init(&tree);
+        tree_start(&tree, 1, 1);
+        TEST_ASSERT_EQUAL_INT32(6000, tree_allocate(&tree));
+        tree_wish(&tree, 0, 3000, 3000);
+        tree.allocator.turn[0].owed_mWs = owed_mWs;
+        tree.allocator.turn[0].lacks_mW = 0;
+        TEST_ASSERT_EQUAL_INT32(owed_mWs == 0 ? 0 : 6000, tree_allocate_after(&tree, 300000));
+    }
+}
+
+static void test_a_queue_begins_empty(void) {
+    taper_queue_t queue = {.wishing = 1, .count = 1};
+    tree_start(&tree, 1, 1);
+    taper_turns_line_up(&tree.allocator, &tree.config, &tree.snapshot, &tree.proposal, &queue);
+    TEST_ASSERT_EQUAL_UINT8(1, queue.count);
+    TEST_ASSERT_EQUAL_UINT8(1, queue.wishing);
+}
+
+static void test_whoever_has_any_current_is_on_and_does_not_wait(void) {
+    for (int32_t current_mA = 0; current_mA < 2; current_mA++) {
+        taper_queue_t queue;
+        tree_init(&tree);
+        tree_start(&tree, 1, 1);
+        tree.setpoints.current_mA[0] = current_mA;
+        taper_turns_begin(&tree.allocator, &tree.config, &tree.snapshot);
+        taper_turns_line_up(&tree.allocator, &tree.config, &tree.snapshot, &tree.proposal, &queue);
+        taper_turns_end(&tree.allocator, &tree.config, &tree.snapshot, &tree.proposal, &queue,
+                        &tree.setpoints);
+        TEST_ASSERT_EQUAL(current_mA > 0, tree.allocator.turn[0].on);
+        TEST_ASSERT_EQUAL_UINT8(current_mA > 0 ? 0 : 1, taper_allocator_waiting(&tree.allocator, 0).place);
+    }
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_who_stands_beyond_the_last_connector_has_no_turn);
+    RUN_TEST(test_the_least_battery_that_is_full_takes_nothing);
+    RUN_TEST(test_who_takes_a_watt_can_charge);
+    RUN_TEST(test_the_least_minimum_needs_a_turn);
+    RUN_TEST(test_who_is_on_stays_for_the_last_of_what_it_is_owed);
+    RUN_TEST(test_a_queue_begins_empty);
+    RUN_TEST(test_whoever_has_any_current_is_on_and_does_not_wait);
+    return UNITY_END();
+}
