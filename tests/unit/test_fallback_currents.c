@@ -298,6 +298,17 @@ static void test_the_guard_refuses_a_sum_above_the_limit_unless_it_was_as_high_b
     TEST_ASSERT_TRUE(passes(W_of_dA(201)));
 }
 
+static void test_the_guard_refuses_a_milliwatt_more_than_before(void) {
+    connectors[0].voltage_mV = 1000; /* 1 W for 1 A */
+    snapshot.demand[0] = (taper_demand_t){0};
+    memset(&fallback, 0, sizeof fallback);
+    taper_ledger_sent(&ledger, 0, 0, 32000, 10000, now_ms);
+    fallback.current_mA[0] = 10000;
+    TEST_ASSERT_TRUE(passes(0));
+    fallback.current_mA[0] = 10001;
+    TEST_ASSERT_FALSE(passes(0));
+}
+
 /** Whatever is granted, echoed or lost: the sum never rises above the limit, and what is chosen is allowed. */
 static void test_whatever_happens_the_sum_is_within_a_constant_limit(void) {
     uint32_t state = 0xfa11;
@@ -375,6 +386,7 @@ int main(void) {
     RUN_TEST(test_a_connector_that_costs_nothing_is_bounded_by_nothing);
     RUN_TEST(test_the_guard_refuses_what_is_above_its_setpoint_or_below_nothing);
     RUN_TEST(test_the_guard_refuses_a_sum_above_the_limit_unless_it_was_as_high_before);
+    RUN_TEST(test_the_guard_refuses_a_milliwatt_more_than_before);
     RUN_TEST(test_whatever_happens_the_sum_is_within_a_constant_limit);
     RUN_TEST(test_when_the_failsafe_limit_falls_who_can_be_reached_gives_up_for_who_cannot);
     RUN_TEST(test_those_who_cannot_be_reached_are_told_no_more_than_fits_for_when_they_can);

@@ -40,6 +40,14 @@ static void test_between_two_lines_a_connector_loads_both(void) {
     bench_assert_bound(1, 6000);
 }
 
+static void test_a_pair_counts_in_the_parents_of_its_group(void) {
+    groups[0].limit_mA = 16000;
+    for (int pair = 0; pair < 3; pair++) {
+        bench_put_between(0, pair);
+        bench_assert_bound(0, 16000);
+    }
+}
+
 static void test_two_pairs_that_meet_in_a_line_add_as_phasors(void) {
     groups[1].limit_mA = 17321;
     for (int pair = 0; pair < 3; pair++) {
@@ -131,6 +139,9 @@ static void test_on_the_delta_side_a_phase_loads_the_two_lines_of_its_winding(vo
     bench_grant(0, 10000);
     connectors[1].rotation = TAPER_ROTATION_231;
     bench_assert_bound(1, 8185); /* meets it in one line, 60 degrees apart */
+    groups[1].delta_mA = 10291;
+    bench_assert_bound(1, 396); /* of 397 mA it is 1 uA too much */
+    groups[1].delta_mA = 16000;
     bench_grant(1, 0);
     connectors[0].phases = 3;
     bench_assert_bound(0, 9232);
@@ -163,6 +174,7 @@ int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_a_connector_between_lines_is_on_the_two_that_its_rotation_names_first);
     RUN_TEST(test_between_two_lines_a_connector_loads_both);
+    RUN_TEST(test_a_pair_counts_in_the_parents_of_its_group);
     RUN_TEST(test_two_pairs_that_meet_in_a_line_add_as_phasors);
     RUN_TEST(test_three_balanced_pairs_load_each_line_with_the_root_of_three);
     RUN_TEST(test_a_connector_between_lines_of_unknown_wiring_counts_on_all_of_them);

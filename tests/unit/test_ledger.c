@@ -125,6 +125,18 @@ static void test_within_a_millisecond_the_counter_tells_which_setpoint_came_firs
     TEST_ASSERT_EQUAL_INT32(0, taper_ledger_may_mA(&ledger, 0));
 }
 
+static void test_within_a_millisecond_the_counter_tells_for_less_than_half_a_turn_of_it(void) {
+    for (uint8_t c = 0; c < 8; c++) {
+        send(0, c, 16000 - 1000 * c);
+    }
+    hear_echo(0, 7);
+    TEST_ASSERT_EQUAL_INT32(9000, taper_ledger_may_mA(&ledger, 0));
+    send(1, 0, 16000);
+    send(1, 8, 6000); /* before the other, or after: nobody knows */
+    hear_echo(1, 8);
+    TEST_ASSERT_EQUAL_INT32(16000, taper_ledger_may_mA(&ledger, 1));
+}
+
 static void test_a_setpoint_expires_after_its_validity_and_what_it_may_have_waited(void) {
     send(0, 0, 16000);
     wait_ms(EXPIRED_ms - 1);
@@ -318,6 +330,7 @@ int main(void) {
     RUN_TEST(test_the_highest_open_setpoint_counts_until_a_later_one_is_echoed);
     RUN_TEST(test_an_old_echo_proves_nothing_of_what_came_after);
     RUN_TEST(test_within_a_millisecond_the_counter_tells_which_setpoint_came_first);
+    RUN_TEST(test_within_a_millisecond_the_counter_tells_for_less_than_half_a_turn_of_it);
     RUN_TEST(test_a_setpoint_expires_after_its_validity_and_what_it_may_have_waited);
     RUN_TEST(test_fallback_ends_what_cannot_have_crossed_the_report);
     RUN_TEST(test_a_setpoint_does_not_outlive_its_vehicle);

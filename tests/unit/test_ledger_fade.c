@@ -141,14 +141,16 @@ static void test_more_levels_than_there_is_room_for_count_as_the_higher_of_two(v
 
 static void test_a_higher_level_that_fades_later_covers_all_lower_ones(void) {
     bench_send(0, 8000, 0);
-    bench_wait_ms(1);
-    bench_send(1, 6000, 0);
+    bench_send(1, 7000, 0);
     bench_hear_echo(1); /* 8 A fades */
-    bench_wait_ms(100);
-    bench_send(2, 20000, 0);
     bench_wait_ms(1);
-    bench_send(3, 0, 0);
-    bench_hear_echo(3); /* 20 A fades */
+    bench_send(2, 6000, 0);
+    bench_hear_echo(2); /* 7 A fades */
+    bench_wait_ms(100);
+    bench_send(3, 20000, 0);
+    bench_wait_ms(1);
+    bench_send(4, 0, 0);
+    bench_hear_echo(4); /* 20 A fades */
     TEST_ASSERT_EQUAL_INT32(20000, ledger.entry[0].fade[0].mA);
     TEST_ASSERT_EQUAL_INT32(0, ledger.entry[0].fade[1].mA);
     bench_assert_changes_after(REACTION_ms, 20000, 0);

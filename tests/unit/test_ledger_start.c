@@ -89,7 +89,6 @@ static void test_after_a_start_an_empty_connector_counts_nothing_and_its_first_e
     TEST_ASSERT_EQUAL_INT32(0, bench_may_mA());
     TEST_ASSERT_EQUAL_INT32(0, bench_fallback_mA());
     bench_send(0, 16000, 8000);
-    bench_wait_ms(1);
     bench_send(1, 6000, 0);
     bench_hear_echo(1);
     TEST_ASSERT_EQUAL_INT32(0, bench_fallback_mA());
@@ -103,6 +102,14 @@ static void test_after_a_start_a_lower_setpoint_of_ours_hides_nothing(void) {
     bench_assert_changes_after(REACTION_ms, 32000, 0);
 }
 
+static void test_who_is_not_there_is_left_alone(void) {
+    bench_start(1);
+    TEST_ASSERT_EQUAL_INT32(0, taper_ledger_told_mA(&ledger, 4));
+    ledger.entry[4].unknown_mA = 777;
+    bench_wait_ms(EXPIRED_ms + REACTION_ms);
+    TEST_ASSERT_EQUAL_INT32(777, taper_ledger_told_mA(&ledger, 4));
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_after_a_start_nobody_is_known_to_be_within_reach);
@@ -114,5 +121,6 @@ int main(void) {
     RUN_TEST(test_after_a_start_an_echo_after_fallback_is_ours);
     RUN_TEST(test_after_a_start_an_empty_connector_counts_nothing_and_its_first_echo_is_ours);
     RUN_TEST(test_after_a_start_a_lower_setpoint_of_ours_hides_nothing);
+    RUN_TEST(test_who_is_not_there_is_left_alone);
     return UNITY_END();
 }

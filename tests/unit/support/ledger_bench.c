@@ -7,14 +7,15 @@
 
 #define START_ms (UINT32_MAX - 4000u)
 
-taper_connector_config_t connectors[4];
+taper_connector_config_t connectors[5];
 taper_station_config_t config;
 taper_ledger_t ledger;
 uint32_t now_ms;
 
 void bench_begin(void) {
-    memcpy(connectors, scene_four()->connectors, sizeof connectors);
-    for (unsigned i = 0; i < 4; i++) {
+    memcpy(connectors, scene_four()->connectors, 4 * sizeof connectors[0]);
+    connectors[4] = connectors[0];
+    for (unsigned i = 0; i < 5; i++) {
         connectors[i].reaction_ms = REACTION_ms;
     }
     config = *scene_four();

@@ -8,7 +8,7 @@
 #define EXPIRED_ms  (VALIDITY_ms + TAPER_LEDGER_LATE_ms)
 #define REACTION_ms 5000u
 
-extern taper_connector_config_t connectors[4]; /**< may be changed */
+extern taper_connector_config_t connectors[5]; /**< may be changed; the last one is not there */
 extern taper_station_config_t config;
 extern taper_ledger_t ledger;
 extern uint32_t now_ms; /**< it wraps in every test that waits for some seconds */
