@@ -170,6 +170,26 @@ static void test_a_delta_line_that_is_above_its_limit_by_one_pair_gets_no_more_o
     TEST_ASSERT_TRUE(bench_passes());
 }
 
+static void test_that_holds_for_each_line_of_each_group(void) {
+    const uint8_t rank[CONNECTORS] = {0, 1, 2, 3, 4, 5};
+    const taper_setpoints_t target = {{6000, 0, 0, 0, 6000}};
+    for (uint8_t group = 0; group < 2; group++) {
+        for (int turn = 0; turn < 3; turn++) {
+            bench_start();
+            for (uint8_t i = 0; i < 3; i++) {
+                bench_put_between(i, (i + turn) % 3);
+            }
+            connectors[4].is_dc = group == 0; /* on all lines: below this one, too */
+            groups[group].delta_mA = 30000;
+            bench_may_draw(1, 12000);
+            bench_may_draw(2, 6100);
+            taper_ledger_grant(&ledger, &config, &snapshot, rank, &supply, &target, &granted);
+            TEST_ASSERT_EQUAL_INT32(0, granted.current_mA[0]);
+            TEST_ASSERT_EQUAL_INT32(group == 0 ? 0 : 6000, granted.current_mA[4]);
+        }
+    }
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_a_connector_between_lines_is_on_the_two_that_its_rotation_names_first);
@@ -184,5 +204,6 @@ int main(void) {
     RUN_TEST(test_on_the_delta_side_three_phases_alike_count_as_in_the_rows);
     RUN_TEST(test_on_the_delta_side_a_phase_loads_the_two_lines_of_its_winding);
     RUN_TEST(test_a_delta_line_that_is_above_its_limit_by_one_pair_gets_no_more_of_another);
+    RUN_TEST(test_that_holds_for_each_line_of_each_group);
     return UNITY_END();
 }

@@ -220,6 +220,25 @@ static void test_while_one_fades_no_other_gets_its_room(void) {
     TEST_ASSERT_EQUAL_INT32(30000, granted.current_mA[2]);
 }
 
+static void test_who_is_not_there_takes_no_room_and_is_granted_nothing(void) {
+    const taper_snapshot_t snapshot = scene_snapshot(now_ms, 4);
+    const taper_supply_t supply = taper_supply_of_W(9200); /* 40 A */
+    const uint8_t rank[4] = {4, 0, 1, 2};
+    const taper_setpoints_t target = {{0, 0, 32000, 0, 16000}};
+    taper_setpoints_t granted = {{0, 0, 0, 0, 777}};
+    for (uint8_t i = 0; i < 4; i++) {
+        const taper_evse_status_t empty = {.pilot = TAPER_PILOT_A};
+        taper_ledger_hear(&ledger, i, &empty, now_ms);
+    }
+    ledger.entry[4].drawn_mA = 32000;
+    taper_ledger_grant(&ledger, &config, &snapshot, rank, &supply, &target, &granted);
+    TEST_ASSERT_EQUAL_INT32(32000, granted.current_mA[2]);
+    TEST_ASSERT_EQUAL_INT32(777, granted.current_mA[4]);
+    ledger.entry[4].drawn_mA = 0;
+    taper_ledger_grant(&ledger, &config, &snapshot, rank, &supply, &target, &granted);
+    TEST_ASSERT_EQUAL_INT32(777, granted.current_mA[4]);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_a_vehicle_has_its_time_to_follow_a_decrease_from_when_the_echo_came);
@@ -237,5 +256,6 @@ int main(void) {
     RUN_TEST(test_a_report_from_before_the_last_update_shortens_nothing);
     RUN_TEST(test_nobody_is_told_more_than_last_while_a_level_fades_above_the_limit);
     RUN_TEST(test_while_one_fades_no_other_gets_its_room);
+    RUN_TEST(test_who_is_not_there_takes_no_room_and_is_granted_nothing);
     return UNITY_END();
 }
