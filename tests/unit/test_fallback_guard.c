@@ -7,7 +7,7 @@
 
 #define NOW_ms 1000u
 
-static taper_connector_config_t connectors[4];
+static taper_connector_config_t connectors[5]; /* the last one is not there */
 static taper_station_config_t config;
 static taper_ledger_t ledger;
 static taper_snapshot_t snapshot;
@@ -15,7 +15,8 @@ static taper_setpoints_t granted, fallback;
 
 void setUp(void) {
     const taper_evse_status_t empty = {.pilot = TAPER_PILOT_A};
-    memcpy(connectors, scene_four()->connectors, sizeof connectors);
+    memcpy(connectors, scene_four()->connectors, 4 * sizeof connectors[0]);
+    connectors[4] = connectors[0];
     config = *scene_four();
     config.connectors = connectors;
     snapshot = scene_snapshot(NOW_ms, 4);
@@ -74,10 +75,16 @@ static void test_the_guard_refuses_a_milliwatt_more_than_before(void) {
     TEST_ASSERT_FALSE(passes(0));
 }
 
+static void test_the_guard_does_not_judge_who_is_not_there(void) {
+    fallback.current_mA[4] = 777;
+    TEST_ASSERT_TRUE(passes(0));
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_the_guard_refuses_what_is_above_its_setpoint_or_below_nothing);
     RUN_TEST(test_the_guard_refuses_a_sum_above_the_limit_unless_it_was_as_high_before);
     RUN_TEST(test_the_guard_refuses_a_milliwatt_more_than_before);
+    RUN_TEST(test_the_guard_does_not_judge_who_is_not_there);
     return UNITY_END();
 }

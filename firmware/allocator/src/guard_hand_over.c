@@ -162,7 +162,7 @@ bool taper_guard_hand_over_passes(const taper_ledger_t *ledger, const taper_stat
                                   const taper_snapshot_t *snapshot, const taper_supply_t *supply,
                                   const taper_setpoints_t *granted) {
     const taper_supply_t described = taper_supply_of_W(INT32_MAX);
-    int32_t current_mA[TAPER_MAX_CONNECTORS];
+    int32_t current_mA[TAPER_MAX_CONNECTORS] = {0};
     load_t before[TAPER_MAX_GROUPS];
     load_t after[TAPER_MAX_GROUPS];
     for (uint8_t i = 0; i < config->connector_count; i++) {
