@@ -120,6 +120,11 @@ static void test_without_a_failsafe_limit_nobody_has_any(void) {
     assert_chosen(0, 0, 0, 0);
     choose(-1);
     assert_chosen(0, 0, 0, 0);
+    connectors[0].voltage_mV = 1000; /* not even the least there is: 0.5 A of 1 V */
+    connectors[0].min_mA = 0;
+    snapshot.demand[0] = (taper_demand_t){0};
+    choose(0);
+    assert_chosen(0, 0, 0, 0);
 }
 
 static void test_it_is_never_above_what_is_granted(void) {
@@ -258,44 +263,21 @@ static void test_who_is_not_there_is_left_alone(void) {
     TEST_ASSERT_EQUAL_INT32(777, fallback.current_mA[4]);
 }
 
+static void test_what_is_not_there_takes_no_room_and_nobody_stands_behind_the_last_place(void) {
+    static const uint8_t longer[5] = {0, 1, 2, 2, 3};
+    ledger.entry[4].over_fallback_mA = 10000;
+    choose(W_of_dA(340));
+    assert_chosen(10000, 10000, 8000, 6000);
+    send_and_echo_all();
+    taper_ledger_grant_fallback(&ledger, &config, &snapshot, longer, W_of_dA(340), &granted, &fallback);
+    assert_chosen(10000, 10000, 8000, 0);
+}
+
 static void test_a_connector_that_costs_nothing_is_bounded_by_nothing(void) {
     connectors[0].voltage_mV = 0;
     snapshot.demand[0] = (taper_demand_t){0};
     choose(0);
     assert_chosen(10000, 0, 0, 0);
-}
-
-static bool passes(int32_t failsafe_W) {
-    return taper_guard_fallback_passes(&ledger, &config, &snapshot, failsafe_W, &granted, &fallback);
-}
-
-static void test_the_guard_refuses_what_is_above_its_setpoint_or_below_nothing(void) {
-    memset(&fallback, 0, sizeof fallback);
-    granted.current_mA[2] = 6000;
-    fallback.current_mA[2] = 6000;
-    TEST_ASSERT_TRUE(passes(10000));
-    fallback.current_mA[2] = 6001;
-    TEST_ASSERT_FALSE(passes(10000));
-    fallback.current_mA[2] = -1;
-    TEST_ASSERT_FALSE(passes(10000));
-}
-
-static void test_the_guard_refuses_a_sum_above_the_limit_unless_it_was_as_high_before(void) {
-    memset(&fallback, 0, sizeof fallback);
-    fallback.current_mA[0] = fallback.current_mA[3] = 10000;
-    TEST_ASSERT_TRUE(passes(W_of_dA(200)));
-    TEST_ASSERT_FALSE(passes(W_of_dA(200) - 1));
-    taper_ledger_sent(&ledger, 0, 0, 32000, 10000, now_ms);
-    TEST_ASSERT_FALSE(passes(W_of_dA(200) - 1));
-    taper_ledger_sent(&ledger, 3, 0, 32000, 10000, now_ms);
-    TEST_ASSERT_TRUE(passes(0));
-    TEST_ASSERT_TRUE(passes(-1000));
-    fallback.current_mA[3] = 10100;
-    TEST_ASSERT_FALSE(passes(0));
-    TEST_ASSERT_FALSE(passes(-1000));
-    fallback.current_mA[0] = 0; /* may be told still */
-    TEST_ASSERT_FALSE(passes(W_of_dA(201) - 1));
-    TEST_ASSERT_TRUE(passes(W_of_dA(201)));
 }
 
 /** Whatever is granted, echoed or lost: the sum never rises above the limit, and what is chosen is allowed. */
@@ -355,6 +337,16 @@ static void test_those_who_cannot_be_reached_are_told_no_more_than_fits_for_when
     assert_chosen(10000, 6000, 0, 0);
 }
 
+static void test_beside_those_who_cannot_be_reached_nothing_is_added_while_they_hold_more_than_the_limit(
+    void) {
+    connectors[0].fallback_mA = 7499;
+    taper_ledger_init(&ledger, &config, VALIDITY_ms, 1, now_ms); /* may have been told in an earlier life */
+    connectors[0].fallback_mA = 7500;
+    taper_ledger_sent(&ledger, 0, 0, 32000, 7500, now_ms);
+    choose(W_of_dA(75));
+    assert_chosen(7000, 0, 0, 0);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_with_room_for_all_everybody_has_the_configured_one);
@@ -372,11 +364,11 @@ int main(void) {
     RUN_TEST(test_power_counts_as_it_is_booked);
     RUN_TEST(test_a_rank_that_names_nobody_or_one_twice_harms_nobody);
     RUN_TEST(test_who_is_not_there_is_left_alone);
+    RUN_TEST(test_what_is_not_there_takes_no_room_and_nobody_stands_behind_the_last_place);
     RUN_TEST(test_a_connector_that_costs_nothing_is_bounded_by_nothing);
-    RUN_TEST(test_the_guard_refuses_what_is_above_its_setpoint_or_below_nothing);
-    RUN_TEST(test_the_guard_refuses_a_sum_above_the_limit_unless_it_was_as_high_before);
     RUN_TEST(test_whatever_happens_the_sum_is_within_a_constant_limit);
     RUN_TEST(test_when_the_failsafe_limit_falls_who_can_be_reached_gives_up_for_who_cannot);
     RUN_TEST(test_those_who_cannot_be_reached_are_told_no_more_than_fits_for_when_they_can);
+    RUN_TEST(test_beside_those_who_cannot_be_reached_nothing_is_added_while_they_hold_more_than_the_limit);
     return UNITY_END();
 }

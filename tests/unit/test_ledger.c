@@ -125,6 +125,18 @@ static void test_within_a_millisecond_the_counter_tells_which_setpoint_came_firs
     TEST_ASSERT_EQUAL_INT32(0, taper_ledger_may_mA(&ledger, 0));
 }
 
+static void test_within_a_millisecond_the_counter_tells_for_less_than_half_a_turn_of_it(void) {
+    for (uint8_t c = 0; c < 8; c++) {
+        send(0, c, 16000 - 1000 * c);
+    }
+    hear_echo(0, 7);
+    TEST_ASSERT_EQUAL_INT32(9000, taper_ledger_may_mA(&ledger, 0));
+    send(1, 0, 16000);
+    send(1, 8, 6000); /* before the other, or after: nobody knows */
+    hear_echo(1, 8);
+    TEST_ASSERT_EQUAL_INT32(16000, taper_ledger_may_mA(&ledger, 1));
+}
+
 static void test_a_setpoint_expires_after_its_validity_and_what_it_may_have_waited(void) {
     send(0, 0, 16000);
     wait_ms(EXPIRED_ms - 1);
@@ -278,6 +290,21 @@ static void test_a_rank_that_names_nobody_or_one_twice_harms_nobody(void) {
     TEST_ASSERT_EQUAL_INT32(0, granted.current_mA[1]);
 }
 
+static void test_who_is_ranked_twice_takes_its_room_once_and_who_stands_behind_the_last_place_none(void) {
+    static const uint8_t longer[5] = {0, 0, 2, 2, 3};
+    const taper_supply_t supply = taper_supply_of_W(9200); /* 40 A */
+    target.current_mA[0] = 10000;
+    target.current_mA[2] = 20000;
+    target.current_mA[3] = 10000;
+    taper_ledger_grant(&ledger, scene_four(), &snapshot, longer, &supply, &target, &granted);
+    TEST_ASSERT_EQUAL_INT32(10000, granted.current_mA[0]);
+    TEST_ASSERT_EQUAL_INT32(20000, granted.current_mA[2]);
+    TEST_ASSERT_EQUAL_INT32(0, granted.current_mA[3]);
+    target.current_mA[2] = 30000;
+    taper_ledger_grant(&ledger, scene_four(), &snapshot, longer, &supply, &target, &granted);
+    TEST_ASSERT_EQUAL_INT32(30000, granted.current_mA[2]);
+}
+
 static void test_what_a_silent_connector_may_draw_counts_by_its_description(void) {
     send(0, 0, 32000);
     snapshot.demand[0] = (taper_demand_t){0};
@@ -318,6 +345,7 @@ int main(void) {
     RUN_TEST(test_the_highest_open_setpoint_counts_until_a_later_one_is_echoed);
     RUN_TEST(test_an_old_echo_proves_nothing_of_what_came_after);
     RUN_TEST(test_within_a_millisecond_the_counter_tells_which_setpoint_came_first);
+    RUN_TEST(test_within_a_millisecond_the_counter_tells_for_less_than_half_a_turn_of_it);
     RUN_TEST(test_a_setpoint_expires_after_its_validity_and_what_it_may_have_waited);
     RUN_TEST(test_fallback_ends_what_cannot_have_crossed_the_report);
     RUN_TEST(test_a_setpoint_does_not_outlive_its_vehicle);
@@ -332,6 +360,7 @@ int main(void) {
     RUN_TEST(test_while_the_sum_is_above_a_limit_that_fell_nobody_is_told_more_than_last);
     RUN_TEST(test_a_setpoint_that_expired_is_not_told_again_without_room);
     RUN_TEST(test_a_rank_that_names_nobody_or_one_twice_harms_nobody);
+    RUN_TEST(test_who_is_ranked_twice_takes_its_room_once_and_who_stands_behind_the_last_place_none);
     RUN_TEST(test_what_a_silent_connector_may_draw_counts_by_its_description);
     RUN_TEST(test_phases_that_are_not_known_are_booked_when_granting);
     RUN_TEST(test_the_guard_of_the_hand_over_refuses_what_is_not_paid_for);

@@ -3,6 +3,8 @@
  * mistake must not blind both. What rows bound by sums, it takes as the length of the phasor where currents flow between
  * two lines; currents to neutral are added, as in the rows.
  */
+#include <string.h>
+
 #include "taper/ledger.h"
 
 #define LINES 3u
@@ -27,18 +29,18 @@ static int32_t power_W_per_A(const taper_connector_config_t *connector, const ta
         const int32_t efficiency = connector->efficiency_permille;
         W_per_A = (W_per_A * 1000 + efficiency - 1) / efficiency;
     }
-    return W_per_A > booked_W_per_A ? W_per_A : booked_W_per_A;
+    return taper_max_i32(W_per_A, booked_W_per_A);
 }
 
 /** Lines that a connector is wired to by its description: bit 0 L1 .. bit 2 L3. */
 static unsigned wired_lines(const taper_connector_config_t *connector) {
-    static const uint8_t first[] = {1, 1, 2, 4,
-                                    1, 2, 4}; /* of rotations unknown, 123, 231, 312, 132, 213, 321 */
-    static const uint8_t second[] = {2, 2, 4, 1, 4, 1, 2};
+    /* of rotations unknown, 123, 231, 312, 132, 213, 321 */
+    static const uint8_t first[] = {1, 1, 2, 4, 1, 2, 4};
+    static const uint8_t first_two[] = {3, 3, 6, 5, 5, 3, 6};
     if (connector->is_dc || connector->phases == LINES) {
         return 7;
     }
-    return first[connector->rotation] | (connector->line_to_line ? second[connector->rotation] : 0u);
+    return (connector->line_to_line ? first_two : first)[connector->rotation];
 }
 
 /** Current in its supply for 1000 A of setpoint. */
@@ -80,9 +82,7 @@ static void add_connector(const taper_station_config_t *config, const taper_dema
 /** Loads per group, a child's in its parent's. */
 static void add_up(const taper_station_config_t *config, const taper_snapshot_t *snapshot,
                    const int32_t *current_mA, load_t *load) {
-    for (uint8_t k = 0; k < config->group_count; k++) {
-        load[k] = (load_t){0};
-    }
+    memset(load, 0, config->group_count * sizeof *load);
     for (uint8_t i = 0; i < config->connector_count; i++) {
         add_connector(config, &snapshot->demand[i], i, current_mA[i], &load[config->connectors[i].group]);
     }
@@ -134,13 +134,13 @@ static int64_t delta_uA(const load_t *load, unsigned line) {
 
 /** Whether what was `before` and is `after` now, in thousandths, may be: within the limit, or no more. */
 static bool may_be(int64_t before, int64_t after, int32_t limit) {
-    return after <= before || after <= (int64_t)(limit > 0 ? limit : 0) * 1000;
+    return after <= before || after <= (int64_t)taper_max_i32(limit, 0) * 1000;
 }
 
 static bool lines_pass(const taper_group_config_t *group, const int32_t *supply_mA, const load_t *before,
                        const load_t *after) {
     for (unsigned line = 0; line < LINES; line++) {
-        const int32_t limit_mA = group->limit_mA < supply_mA[line] ? group->limit_mA : supply_mA[line];
+        const int32_t limit_mA = taper_min_i32(group->limit_mA, supply_mA[line]);
         if (group->limit_mA != 0 && !may_be(line_uA(before, line), line_uA(after, line), limit_mA)) {
             return false;
         }
@@ -153,7 +153,7 @@ static bool lines_pass(const taper_group_config_t *group, const int32_t *supply_
 
 static bool group_passes(const taper_group_config_t *group, const taper_supply_t *supply,
                          const load_t *before, const load_t *after) {
-    const int32_t limit_W = group->limit_W < supply->site_W ? group->limit_W : supply->site_W;
+    const int32_t limit_W = taper_min_i32(group->limit_W, supply->site_W);
     return (group->limit_W == 0 || may_be(before->power_mW, after->power_mW, limit_W)) &&
            lines_pass(group, supply->phase_mA, before, after);
 }
@@ -170,7 +170,7 @@ bool taper_guard_hand_over_passes(const taper_ledger_t *ledger, const taper_stat
     }
     add_up(config, snapshot, current_mA, before);
     for (uint8_t i = 0; i < config->connector_count; i++) {
-        current_mA[i] = granted->current_mA[i] > current_mA[i] ? granted->current_mA[i] : current_mA[i];
+        current_mA[i] = taper_max_i32(granted->current_mA[i], current_mA[i]);
     }
     add_up(config, snapshot, current_mA, after);
     for (uint8_t k = 0; k < config->group_count; k++) {
@@ -194,7 +194,7 @@ bool taper_guard_fallback_passes(const taper_ledger_t *ledger, const taper_stati
             return false;
         }
         before_mW += (int64_t)W_per_A * before_mA;
-        after_mW += (int64_t)W_per_A * (told_mA > before_mA ? told_mA : before_mA);
+        after_mW += (int64_t)W_per_A * taper_max_i32(told_mA, before_mA);
     }
     return may_be(before_mW, after_mW, failsafe_W);
 }

@@ -108,7 +108,7 @@ static void follow_down(const taper_ledger_t *ledger, uint8_t connector, taper_l
 
 static void drop_faded(taper_ledger_entry_t *entry, uint32_t time_ms) {
     while (entry->fade[0].mA != 0 && taper_time_reached(time_ms, entry->fade[0].until_ms)) {
-        memmove(entry->fade, entry->fade + 1, (TAPER_LEDGER_FADES - 1u) * sizeof entry->fade[0]);
+        memmove(entry->fade, entry->fade + 1, (TAPER_LEDGER_FADES - 1u) * sizeof *entry->fade);
         entry->fade[TAPER_LEDGER_FADES - 1u].mA = 0;
     }
 }
