@@ -50,8 +50,6 @@ static taper_command_t command_for(const taper_station_t *station, uint8_t i) {
 static taper_message_t setpoint_of(const taper_station_t *station, uint8_t i) {
     const taper_connector_config_t *connector = &station->options.config->connectors[i];
     const int32_t current_mA = station->setpoints.current_mA[i];
-    const taper_demand_t *demand = &station->snapshot.demand[i];
-    const uint8_t conductors = demand->active ? demand->conductors : connector->phases;
     return (taper_message_t){
         .kind = TAPER_MESSAGE_SETPOINT,
         .bus = connector->bus,
@@ -62,7 +60,8 @@ static taper_message_t setpoint_of(const taper_station_t *station, uint8_t i) {
                 .current_mA = current_mA,
                 .validity_ms = (int32_t)station->ledger.validity_ms,
                 .fallback_mA = station->fallback.current_mA[i],
-                .phase_mask = (uint8_t)((1u << conductors) - 1u), /* others are not booked */
+                .phase_mask =
+                    (uint8_t)((1u << taper_phases_allowed(station, i)) - 1u), /* others are not booked */
                 .session = station->setpoint_session[i],
             },
     };
@@ -90,6 +89,7 @@ static void send_setpoint(taper_station_t *station, uint8_t i, uint32_t now_ms) 
                           station->fallback.current_mA[i], now_ms);
         taper_shape_sent(&station->shape, i, station->setpoints.current_mA[i], new_session,
                          now_ms * station->options.time_scale);
+        taper_phases_sent(station, i, now_ms);
         station->sent_mA[i] = station->setpoints.current_mA[i];
         station->sent_fallback_mA[i] = station->fallback.current_mA[i];
         station->sent_command[i] = (uint8_t)message.as.setpoint.command;
