@@ -9,7 +9,7 @@
 #define VALIDITY_MOST_ms 127000u
 /** Setpoints wait behind frames of transfers: a peer that asks for no gap gets no more than this at a time. */
 #define TRANSFER_FRAMES 8u
-/** Counters that increases without an echo leave for a decrease. */
+/** Counters that increases and repeats without an echo leave for a decrease. The others last while a setpoint does. */
 #define COUNTERS_KEPT 4u
 /** PLAN goes round all connectors in this many seconds. */
 #define PLAN_ROUND_s 8u
@@ -67,13 +67,20 @@ static taper_message_t setpoint_of(const taper_station_t *station, uint8_t i) {
     };
 }
 
+/** Whether the setpoint takes something away from what was told last. */
+static bool is_less(const taper_station_t *station, uint8_t i) {
+    const taper_ledger_entry_t *entry = &station->ledger.entry[i];
+    return station->setpoints.current_mA[i] < entry->last_mA ||
+           station->fallback.current_mA[i] < entry->last_fallback_mA ||
+           (command_for(station, i) == TAPER_COMMAND_STOP && station->sent_command[i] != TAPER_COMMAND_STOP);
+}
+
 /** Whether a counter is free for this setpoint: while it is not, an older one with that counter may be in force. */
 static bool has_counter(const taper_station_t *station, uint8_t i) {
     const uint8_t counter = station->setpoint_counter[i];
-    const bool increase = station->setpoints.current_mA[i] > taper_max_i32(station->sent_mA[i], 0);
     const uint8_t last = (uint8_t)((counter + COUNTERS_KEPT) % TAPER_LEDGER_SETPOINTS);
     return taper_ledger_can_send(&station->ledger, i, counter) &&
-           (!increase || taper_ledger_can_send(&station->ledger, i, last));
+           (is_less(station, i) || taper_ledger_can_send(&station->ledger, i, last));
 }
 
 /** One setpoint, noted in the ledger before anybody can act on it. What was refused is tried again with the newest value. */
