@@ -115,6 +115,12 @@ static void test_options_that_make_no_sense_are_refused(void) {
     with.iterations_per_tick = TAPER_MIN_SLICE - 1;
     TEST_ASSERT_EQUAL(TAPER_ERR_ARGUMENT, taper_station_init(&bench.station, &with));
     taper_station_config_t config = *bench_options().config;
+    with = bench_options();
+    with.config = &config;
+    with.time_scale = 1000;
+    TEST_ASSERT_EQUAL(TAPER_OK, taper_station_init(&bench.station, &with));
+    config.tick_ms = 999; /* of the world: less than a millisecond of the bus */
+    TEST_ASSERT_EQUAL(TAPER_ERR_ARGUMENT, taper_station_init(&bench.station, &with));
     config.connector_count = 0;
     with = bench_options();
     with.config = &config;

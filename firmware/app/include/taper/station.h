@@ -55,7 +55,7 @@ typedef struct {
     uint16_t iterations_per_tick; /**< solver iterations in a control tick, >= TAPER_MIN_SLICE */
     /** Simulation: so many times faster than the bus run batteries, departures, the wall clock and the planning steps,
         while periods and timeouts of the bus stay as they are. `tick_ms` of the configuration counts in their time.
-        0 is 1, a real station. At most TAPER_MAX_TIME_SCALE. */
+        0 is 1, a real station. At most TAPER_MAX_TIME_SCALE, and `tick_ms`. */
     uint16_t time_scale;
 } taper_station_options_t;
 
