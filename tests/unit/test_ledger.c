@@ -168,6 +168,17 @@ static void test_a_setpoint_does_not_outlive_its_vehicle(void) {
     TEST_ASSERT_EQUAL_INT32(0, taper_ledger_may_mA(&ledger, 1));
 }
 
+static void test_what_flows_without_a_vehicle_is_booked_for_as_long_as_it_is_told(void) {
+    taper_evse_status_t welded = {.pilot = TAPER_PILOT_A, .current_mA = {16000, TAPER_ABSENT, TAPER_ABSENT}};
+    send(0, 3, 16000);
+    taper_ledger_hear(&ledger, 0, &welded, now_ms);
+    TEST_ASSERT_EQUAL_INT32(16000, taper_ledger_may_mA(&ledger, 0));
+    TEST_ASSERT_EQUAL_INT32(0, taper_ledger_told_mA(&ledger, 0));
+    welded.current_mA[0] = 0;
+    taper_ledger_hear(&ledger, 0, &welded, now_ms);
+    TEST_ASSERT_EQUAL_INT32(0, taper_ledger_may_mA(&ledger, 0));
+}
+
 static void test_of_sixteen_setpoints_without_an_echo_none_is_sent_over_another(void) {
     for (uint8_t c = 0; c < TAPER_LEDGER_SETPOINTS; c++) {
         TEST_ASSERT_TRUE(taper_ledger_can_send(&ledger, 0, c));
@@ -349,6 +360,7 @@ int main(void) {
     RUN_TEST(test_a_setpoint_expires_after_its_validity_and_what_it_may_have_waited);
     RUN_TEST(test_fallback_ends_what_cannot_have_crossed_the_report);
     RUN_TEST(test_a_setpoint_does_not_outlive_its_vehicle);
+    RUN_TEST(test_what_flows_without_a_vehicle_is_booked_for_as_long_as_it_is_told);
     RUN_TEST(test_of_sixteen_setpoints_without_an_echo_none_is_sent_over_another);
     RUN_TEST(test_a_counter_is_free_again_when_no_report_can_name_the_setpoint_that_had_it);
     RUN_TEST(test_a_counter_is_free_at_once_when_a_later_one_was_echoed);

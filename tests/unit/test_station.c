@@ -115,6 +115,12 @@ static void test_options_that_make_no_sense_are_refused(void) {
     with.iterations_per_tick = TAPER_MIN_SLICE - 1;
     TEST_ASSERT_EQUAL(TAPER_ERR_ARGUMENT, taper_station_init(&bench.station, &with));
     taper_station_config_t config = *bench_options().config;
+    with = bench_options();
+    with.config = &config;
+    with.time_scale = 1000;
+    TEST_ASSERT_EQUAL(TAPER_OK, taper_station_init(&bench.station, &with));
+    config.tick_ms = 999; /* of the world: less than a millisecond of the bus */
+    TEST_ASSERT_EQUAL(TAPER_ERR_ARGUMENT, taper_station_init(&bench.station, &with));
     config.connector_count = 0;
     with = bench_options();
     with.config = &config;
@@ -179,6 +185,37 @@ static void test_a_connector_that_falls_silent_stays_booked_by_its_measured_volt
     }
 }
 
+/** What eight connectors, clock and gateway say, and a control tick; the rest of it in polls. Connector 1 still echoes `echo`. */
+static void pass_slow_tick(uint8_t echo, int32_t limit_W, unsigned polls) {
+    bench.echo[1] = echo;
+    bench_send_all(1, limit_W);
+    bench_step();
+    for (unsigned k = 0; k < polls; k++) {
+        bench.echo[1] = echo;
+        bench_send_status(1, true);
+        bench_poll(500);
+    }
+}
+
+static void test_who_does_not_echo_is_told_less_at_once_however_long_setpoints_last(void) {
+    taper_station_options_t options = bench_options();
+    taper_station_config_t slow = *options.config;
+    slow.tick_ms = 10000; /* so a setpoint lasts for 30 s */
+    options.config = &slow;
+    bench_start(&options);
+    for (int k = 0; k < 5; k++) {
+        pass_slow_tick(bench.echo[1], 50000, 18);
+    }
+    TEST_ASSERT_GREATER_THAN_INT32(10000, bench_setpoint_for(1).current_mA);
+    const uint8_t echo = bench.echo[1];
+    for (int k = 0; k < 5; k++) {
+        pass_slow_tick(echo, 50000, 18);
+    }
+    TEST_ASSERT_GREATER_OR_EQUAL_INT32(6000, bench_setpoint_for(1).current_mA);
+    pass_slow_tick(echo, 0, 0);
+    TEST_ASSERT_EQUAL_INT32(0, bench_setpoint_for(1).current_mA);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_without_a_planner_a_soc_frame_still_gives_a_setpoint_frame);
@@ -193,5 +230,6 @@ int main(void) {
     RUN_TEST(test_a_description_out_of_range_is_refused_at_boot);
     RUN_TEST(test_a_feeder_tree_that_is_none_is_refused_at_boot);
     RUN_TEST(test_a_connector_that_falls_silent_stays_booked_by_its_measured_voltage);
+    RUN_TEST(test_who_does_not_echo_is_told_less_at_once_however_long_setpoints_last);
     return UNITY_END();
 }

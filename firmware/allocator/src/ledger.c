@@ -190,6 +190,7 @@ void taper_ledger_hear(taper_ledger_t *ledger, uint8_t connector, const taper_ev
     if (!status->ev_present || status->pilot == TAPER_PILOT_A) {
         memset(entry, 0, sizeof *entry); /* a setpoint does not outlive its session */
         entry->first_echo = ECHO_IS_OURS;
+        hear_draw(ledger, connector, entry, status, at_ms); /* a contactor that is welded */
         return;
     }
     const int32_t before_mA = in_force_mA(entry);

@@ -125,21 +125,32 @@ static taper_candidate_t by_laxity(taper_stage_t stage, const taper_demand_t *de
     return (taper_candidate_t){.stage = (uint8_t)stage, .connector = i, .key = key};
 }
 
+/** Of a shorter turn, the hand-over would leave nothing: it would be over before the current came. */
+static uint32_t whole_turn_ms(const taper_station_config_t *config) {
+    uint32_t reaction_ms = 0;
+    for (uint8_t i = 0; i < config->connector_count; i++) {
+        const uint32_t own_ms = config->connectors[i].reaction_ms;
+        reaction_ms = own_ms > reaction_ms ? own_ms : reaction_ms;
+    }
+    const uint32_t least_ms = reaction_ms == 0 ? 0 : 2u * (reaction_ms + config->change_ms);
+    return config->turn_ms > least_ms ? config->turn_ms : least_ms;
+}
+
 static taper_candidate_t candidate_of(const taper_turn_t *turn, const taper_station_config_t *config,
-                                      const taper_snapshot_t *snapshot, uint8_t i) {
+                                      const taper_snapshot_t *snapshot, uint8_t i, uint32_t turn_ms) {
     const taper_demand_t *demand = &snapshot->demand[i];
     const uint32_t now_ms = snapshot->now_ms;
     if (held(turn, true, now_ms, config->min_on_ms)) {
         return by_laxity(TAPER_STAGE_HELD, demand, i);
     }
-    if (held(turn, true, now_ms, config->turn_ms)) {
+    if (held(turn, true, now_ms, turn_ms)) {
         return by_laxity(TAPER_STAGE_TURN, demand, i);
     }
     if (held(turn, false, now_ms, config->min_off_ms)) {
         return by_laxity(TAPER_STAGE_KEPT_OFF, demand, i);
     }
     const uint32_t waited_ms = taper_elapsed_ms(now_ms, turn->waiting_ms);
-    if (turn->place > 0 && waited_ms >= config->turn_ms) {
+    if (turn->place > 0 && waited_ms >= turn_ms) {
         return (taper_candidate_t){
             .stage = TAPER_STAGE_OVERDUE, .connector = i, .key = UINT32_MAX - waited_ms};
     }
@@ -164,6 +175,7 @@ void taper_turns_line_up(const taper_allocator_t *allocator, const taper_station
                          const taper_snapshot_t *snapshot, const taper_proposal_t *proposal,
                          taper_queue_t *queue) {
     bool left_over[TAPER_MAX_CONNECTORS] = {false};
+    const uint32_t turn_ms = whole_turn_ms(config);
     queue->count = 0;
     for (uint8_t i = 0; i < snapshot->count; i++) {
         const taper_turn_t *turn = &allocator->turn[i];
@@ -171,7 +183,7 @@ void taper_turns_line_up(const taper_allocator_t *allocator, const taper_station
             continue;
         }
         if (calls_for_minimum(turn, config, snapshot, proposal, i)) {
-            line_up_one(queue, 0, candidate_of(turn, config, snapshot, i));
+            line_up_one(queue, 0, candidate_of(turn, config, snapshot, i, turn_ms));
         } else {
             left_over[i] = allows_minimum(config, &snapshot->demand[i], proposal, i);
         }
@@ -179,7 +191,8 @@ void taper_turns_line_up(const taper_allocator_t *allocator, const taper_station
     queue->wishing = queue->count;
     for (uint8_t i = 0; i < snapshot->count; i++) {
         if (left_over[i]) {
-            line_up_one(queue, queue->wishing, candidate_of(&allocator->turn[i], config, snapshot, i));
+            line_up_one(queue, queue->wishing,
+                        candidate_of(&allocator->turn[i], config, snapshot, i, turn_ms));
         }
     }
 }

@@ -68,6 +68,7 @@ static void watch_draw(taper_station_t *station, uint8_t i, uint32_t now_ms) {
 static void take_snapshot(taper_station_t *station, uint32_t now_ms) {
     taper_session_snapshot(&station->sessions, now_ms, &station->snapshot);
     for (uint8_t i = 0; i < station->snapshot.count; i++) {
+        taper_phases_update(station, i, now_ms);
         watch_draw(station, i, now_ms);
     }
 }

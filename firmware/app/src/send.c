@@ -9,7 +9,7 @@
 #define VALIDITY_MOST_ms 127000u
 /** Setpoints wait behind frames of transfers: a peer that asks for no gap gets no more than this at a time. */
 #define TRANSFER_FRAMES 8u
-/** Counters that increases without an echo leave for a decrease. */
+/** Counters that increases and repeats without an echo leave for a decrease. The others last while a setpoint does. */
 #define COUNTERS_KEPT 4u
 /** PLAN goes round all connectors in this many seconds. */
 #define PLAN_ROUND_s 8u
@@ -50,8 +50,6 @@ static taper_command_t command_for(const taper_station_t *station, uint8_t i) {
 static taper_message_t setpoint_of(const taper_station_t *station, uint8_t i) {
     const taper_connector_config_t *connector = &station->options.config->connectors[i];
     const int32_t current_mA = station->setpoints.current_mA[i];
-    const taper_demand_t *demand = &station->snapshot.demand[i];
-    const uint8_t conductors = demand->active ? demand->conductors : connector->phases;
     return (taper_message_t){
         .kind = TAPER_MESSAGE_SETPOINT,
         .bus = connector->bus,
@@ -62,19 +60,27 @@ static taper_message_t setpoint_of(const taper_station_t *station, uint8_t i) {
                 .current_mA = current_mA,
                 .validity_ms = (int32_t)station->ledger.validity_ms,
                 .fallback_mA = station->fallback.current_mA[i],
-                .phase_mask = (uint8_t)((1u << conductors) - 1u), /* others are not booked */
+                .phase_mask =
+                    (uint8_t)((1u << taper_phases_allowed(station, i)) - 1u), /* others are not booked */
                 .session = station->setpoint_session[i],
             },
     };
 }
 
+/** Whether the setpoint takes something away from what was told last. */
+static bool is_less(const taper_station_t *station, uint8_t i) {
+    const taper_ledger_entry_t *entry = &station->ledger.entry[i];
+    return station->setpoints.current_mA[i] < entry->last_mA ||
+           station->fallback.current_mA[i] < entry->last_fallback_mA ||
+           (command_for(station, i) == TAPER_COMMAND_STOP && station->sent_command[i] != TAPER_COMMAND_STOP);
+}
+
 /** Whether a counter is free for this setpoint: while it is not, an older one with that counter may be in force. */
 static bool has_counter(const taper_station_t *station, uint8_t i) {
     const uint8_t counter = station->setpoint_counter[i];
-    const bool increase = station->setpoints.current_mA[i] > taper_max_i32(station->sent_mA[i], 0);
     const uint8_t last = (uint8_t)((counter + COUNTERS_KEPT) % TAPER_LEDGER_SETPOINTS);
     return taper_ledger_can_send(&station->ledger, i, counter) &&
-           (!increase || taper_ledger_can_send(&station->ledger, i, last));
+           (is_less(station, i) || taper_ledger_can_send(&station->ledger, i, last));
 }
 
 /** One setpoint, noted in the ledger before anybody can act on it. What was refused is tried again with the newest value. */
@@ -90,6 +96,7 @@ static void send_setpoint(taper_station_t *station, uint8_t i, uint32_t now_ms) 
                           station->fallback.current_mA[i], now_ms);
         taper_shape_sent(&station->shape, i, station->setpoints.current_mA[i], new_session,
                          now_ms * station->options.time_scale);
+        taper_phases_sent(station, i, now_ms);
         station->sent_mA[i] = station->setpoints.current_mA[i];
         station->sent_fallback_mA[i] = station->fallback.current_mA[i];
         station->sent_command[i] = (uint8_t)message.as.setpoint.command;

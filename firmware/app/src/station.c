@@ -39,6 +39,9 @@ taper_status_t taper_station_init(taper_station_t *station, const taper_station_
     if (config_status != TAPER_OK) {
         return config_status;
     }
+    if (options->time_scale > options->config->tick_ms) {
+        return TAPER_ERR_ARGUMENT;
+    }
     memset(station, 0, sizeof *station);
     station->options = *options;
     station->options.time_scale = options->time_scale == 0 ? 1 : options->time_scale;
@@ -80,7 +83,8 @@ static void begin(taper_station_t *station, uint32_t now_ms) {
     taper_ledger_update(&station->ledger, now_ms);
     taper_bus_guard_update(station, now_ms);
     watch_rival(station, now_ms);
-    taper_station_check_seal(station, now_ms); /* before they are worked out anew, and again before they are sent */
+    taper_station_check_seal(station,
+                             now_ms); /* before they are worked out anew, and again before they are sent */
 }
 
 static void copy_counters(taper_station_t *station) {

@@ -54,6 +54,17 @@ bool taper_station_is_sealed(const taper_station_t *station);
 /** Fault 48: if not, they are worked out again. */
 void taper_station_check_seal(taper_station_t *station, uint32_t now_ms);
 
+/* phases.c */
+
+/** Bound what connector `i` is booked by, and which conductors it is allowed, by what it was told; after the snapshot. */
+void taper_phases_update(taper_station_t *station, uint8_t i, uint32_t now_ms);
+
+/** Conductors that its setpoints allow now. */
+uint8_t taper_phases_allowed(const taper_station_t *station, uint8_t i);
+
+/** A setpoint with its present current went out. */
+void taper_phases_sent(taper_station_t *station, uint8_t i, uint32_t now_ms);
+
 /* reason.c */
 
 /** The limit of site or tree that leaves no more for connector `i`, or PLANNED. Cost: O(depth of the tree). */

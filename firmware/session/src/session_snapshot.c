@@ -101,8 +101,8 @@ static uint8_t phases_booked(const taper_connector_config_t *connector, const ta
 
 /* What 1 A of a connector counts with `conductors` in use. One that does not know its wiring counts as three phases, in
    power too. */
-static taper_booking_t booking_of(const taper_session_table_t *table, uint8_t connector, uint32_t now_ms,
-                                  uint8_t conductors) {
+taper_booking_t taper_session_booking(const taper_session_table_t *table, uint8_t connector, uint32_t now_ms,
+                                      uint8_t conductors) {
     const taper_connector_config_t *config = &table->config->connectors[connector];
     const taper_session_t *session = &table->session[connector];
     taper_booking_t booking = taper_booking_nominal(table->config, connector);
@@ -202,7 +202,7 @@ bool taper_session_demand(const taper_session_table_t *table, uint8_t connector,
     const taper_session_t *session = &table->session[connector];
     memset(demand, 0, sizeof *demand);
     demand->booking =
-        booking_of(table, connector, now_ms, config->phases); /* whatever its phases do by now */
+        taper_session_booking(table, connector, now_ms, config->phases); /* whatever its phases do by now */
     if (obstacle(table, connector, now_ms) != TAPER_REASON_PLANNED) {
         return false;
     }
@@ -220,7 +220,7 @@ bool taper_session_demand(const taper_session_table_t *table, uint8_t connector,
     demand->min_mA = min_mA;
     demand->W_per_A = voltage_V * phases_in_use(config, session);
     demand->conductors = phases_in_use(config, session);
-    demand->booking = booking_of(table, connector, now_ms, demand->conductors);
+    demand->booking = taper_session_booking(table, connector, now_ms, demand->conductors);
     demand->departs_in_s = departs_in_s(table, session, now_ms);
     fill_battery(demand, session, now_ms);
     return true;

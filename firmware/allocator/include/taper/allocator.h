@@ -13,7 +13,8 @@
  * switched on within `min_off_ms` of being switched off. Whom only a ceiling calls for comes after all wishes.
  *
  * If one minimum fits, somebody is on. With places for K of M connectors nobody waits longer than ceil(M / K) turns, one
- * `min_off_ms`, and a tick per turn, while limits and wishes stay; a turn is the longer of `turn_ms` and `min_on_ms`. Where
+ * `min_off_ms`, and a tick per turn, while limits and wishes stay; a turn is the longest of `turn_ms`, `min_on_ms`, and, where
+ * vehicles take time to follow, twice what a hand-over takes (the longest reaction and `change_ms`). Where
  * minima differ, room is kept for the first one that waited for a turn in vain, so that small ones do not shut it out.
  *
  * A wish below the minimum is followed over time: what is given is booked against what was wished. The connector is

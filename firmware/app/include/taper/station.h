@@ -55,7 +55,7 @@ typedef struct {
     uint16_t iterations_per_tick; /**< solver iterations in a control tick, >= TAPER_MIN_SLICE */
     /** Simulation: so many times faster than the bus run batteries, departures, the wall clock and the planning steps,
         while periods and timeouts of the bus stay as they are. `tick_ms` of the configuration counts in their time.
-        0 is 1, a real station. At most TAPER_MAX_TIME_SCALE. */
+        0 is 1, a real station. At most TAPER_MAX_TIME_SCALE, and `tick_ms`. */
     uint16_t time_scale;
 } taper_station_options_t;
 
@@ -125,6 +125,15 @@ typedef struct {
     uint32_t heard_ms;
 } taper_stranger_t;
 
+/** Conductors that one connector's setpoints allow; 0: none was sent to its vehicle. */
+typedef struct {
+    uint8_t allowed;  /**< by those of now */
+    uint8_t most;     /**< by some with a current that may be in force */
+    uint32_t most_ms; /**< when the last of these was sent */
+    bool waits;       /**< more are wanted, since `waits_ms` */
+    uint32_t waits_ms;
+} taper_conductors_t;
+
 /** How much energy a vehicle still gets, by the plan or else by its present power. */
 typedef struct {
     uint32_t made_ms;   /**< time of the plan, in the world's */
@@ -150,6 +159,7 @@ typedef struct {
     taper_ledger_t ledger;
     taper_shape_t shape;
     taper_draw_t draw[TAPER_MAX_CONNECTORS];
+    taper_conductors_t conductors[TAPER_MAX_CONNECTORS];
     taper_health_t health; /**< of the planner */
     taper_self_t self;     /**< of this controller */
     taper_stranger_t stranger[TAPER_STRANGERS];
