@@ -117,6 +117,10 @@ static bool serve(sim_queue_t *queue, const sim_waiting_t *waiting, int64_t now_
     return true;
 }
 
+void sim_queue_leave(sim_queue_t *queue, int64_t now_s) {
+    unplug_departed(queue, (double)now_s);
+}
+
 void sim_queue_advance(sim_queue_t *queue, int64_t now_s) {
     unplug_departed(queue, (double)now_s);
     admit(queue, now_s);

@@ -33,6 +33,9 @@ typedef struct {
 void sim_queue_init(sim_queue_t *queue, const sim_sessions_t *sessions, sim_evse_t *evse, unsigned connectors,
                     sim_outcome_t *outcome);
 
+/** The first half of sim_queue_advance(): who has to leave by `now_s` does. */
+void sim_queue_leave(sim_queue_t *queue, int64_t now_s);
+
 /**
  * Bring everything to `now_s`: whose departure has come leaves first, then who has come is plugged in, by arrival: at
  * its own connector or else the lowest that is free. Who finds none waits, and holds up nobody who does.

@@ -58,3 +58,11 @@ def test_who_takes_nothing_from_others_waits_for_nobody(sim):
     run = sim.run([FIRST, URGENT], "--limit-kw", 50)
     assert float(at(run, "urgent", 600)["current_a"]) == pytest.approx(32, abs=0.1)
     assert float(at(run, "first", 600)["current_a"]) == pytest.approx(32, abs=0.1)
+
+
+def test_nothing_is_kept_for_a_vehicle_that_left_when_the_next_one_is_plugged_in(sim):
+    """In long ticks its setpoint ran out, and the connector fell back: that says nothing about the next vehicle."""
+    before = session("before", **CAR, connector=1, departure_s=1800)
+    after = session("after", **CAR, connector=1, arrival_s=1800, departure_s=3600)
+    run = sim.run([before, after], "--limit-kw", LIMIT_KW, "--tick-s", 900)
+    assert float(at(run, "after", 1800)["current_a"]) == pytest.approx(32, abs=0.5)

@@ -26,6 +26,11 @@ def add_limit_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--limit-csv", type=Path, help="CSV time_s,limit_kw: each limit holds until the next")
 
 
+def shared_kw(share: float, sessions: list[Session]) -> float:
+    """A share of what the cars could take at the busiest moment [kW]."""
+    return round(share * peak_present(sessions) * KW_PER_CAR, 3)
+
+
 def limit_of_options(options: argparse.Namespace, sessions: list[Session]) -> SiteLimit:
     if options.limit_csv is not None:
         limit = read_limit_csv(options.limit_csv)
@@ -35,6 +40,6 @@ def limit_of_options(options: argparse.Namespace, sessions: list[Session]) -> Si
         kw, text = options.limit_kw, f"{options.limit_kw:g} kW"
     else:
         cars = peak_present(sessions)
-        kw = round(options.limit_share * cars * KW_PER_CAR, 3)
+        kw = shared_kw(options.limit_share, sessions)
         text = f"{kw:g} kW = {options.limit_share:g} x {cars} cars at once x {KW_PER_CAR} kW"
     return SiteLimit(constant_limit(kw), text, ("--limit-kw", str(kw)))
