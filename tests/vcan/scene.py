@@ -25,6 +25,7 @@ FALLBACK_dA = 60
 FALLBACKS = 2  # of 4.14 kW each: the failsafe limit has room for so many
 FAILSAFE = 3  # mode
 ABSENT = 0x8000
+ERROR_BUSOFF = socket.CAN_ERR_FLAG | 0x40
 WORLD_S = 1_790_000_000
 OLDEST_S = 30  # no frame is held back longer
 COLUMNS = "session_id,connector,arrival_s,departure_s,battery_kwh,soc_arrival,soc_target,max_kw,taper_kw"
@@ -177,6 +178,17 @@ class Scene:
 
     def modes(self, since_s):
         return [(frame.time_s, bits(frame.data, 12, 4)) for frame in self.bus.since(since_s, CTRL_STATUS, {0})]
+
+    def go_bus_off(self):
+        """Error frames until the station has noticed. Nothing else is heard on a bus that is off, but here the others go on,
+        and for the station who hears is on the bus: one frame right after the error frame, and it never was off."""
+        said = len(self.station.lines)
+
+        def notices():
+            self.inject(ERROR_BUSOFF)
+            return any("event=bus_off" in line for line in self.station.lines[said:])
+
+        wait_until(notices, "bus-off")
 
     def inject(self, can_id, data=bytes(8)):
         """A frame as it stands: an error frame, for one."""
