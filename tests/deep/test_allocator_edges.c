@@ -61,6 +61,18 @@ static void test_a_group_beyond_the_last_one_has_no_rows(void) {
     TEST_ASSERT_EQUAL_UINT8(4, rooms.kinds);
 }
 
+static void test_what_is_taken_is_taken_once_from_each_row(void) {
+    taper_rooms_t rooms;
+    start(1, 32000, "0");
+    tree.group[0].limit_W = 7000;
+    taper_rooms_open(&rooms, &tree.config, &tree.supply);
+    const taper_booking_t booking = taper_booking_now(&tree.config, &tree.snapshot, 0);
+    taper_rooms_take(&rooms, &tree.config, 0, &booking, 10000);
+    TEST_ASSERT_EQUAL_INT64(4700000, rooms.room[0][TAPER_ROW_POWER]);
+    TEST_ASSERT_EQUAL_INT64(22000000, rooms.room[0][TAPER_ROW_L1]);
+    TEST_ASSERT_EQUAL_INT64(32000000, rooms.room[0][TAPER_ROW_L2]);
+}
+
 static void test_ceilings_are_filled_before_any_is_rounded_up(void) {
     start(2, 20000, "01");
     tree_wish(&tree, 0, 6000, 6000);
@@ -163,6 +175,7 @@ int main(void) {
     RUN_TEST(test_what_is_reserved_beyond_the_last_connector_is_nothing);
     RUN_TEST(test_a_negative_wish_gives_nothing_and_a_great_one_is_exact);
     RUN_TEST(test_a_group_beyond_the_last_one_has_no_rows);
+    RUN_TEST(test_what_is_taken_is_taken_once_from_each_row);
     RUN_TEST(test_ceilings_are_filled_before_any_is_rounded_up);
     RUN_TEST(test_a_rank_of_who_is_not_there_raises_nobody);
     RUN_TEST(test_balance_cuts_by_rank_those_without_a_minimum);
