@@ -142,11 +142,12 @@ void taper_balance(const taper_station_config_t *config, const taper_snapshot_t 
         balance.permille[i] = booking.permille;
     }
     /* It ends: while a group tilts, somebody on its strong phase and not on its weak one has current, so every round lowers
-     * somebody. Groups within groups could pass small cuts to and fro; so after as many rounds as there are connectors, each
-     * switches at least one of them off. */
+     * somebody. A group needs two rounds, one for each phase above its weakest, but groups within groups could pass small cuts
+     * to and fro; so after as many rounds as that takes, and one per connector, each switches at least one of them off. */
+    const unsigned lowering = config->connector_count + 2u * config->group_count;
     unsigned rounds = 0;
     for (tilt_t tilt = find_tilt(&balance); tilt.excess_uA > 0; tilt = find_tilt(&balance)) {
-        if (rounds < config->connector_count) {
+        if (rounds < lowering) {
             cut(&balance, &tilt, lower);
         }
         cut(&balance, &tilt, switch_off);

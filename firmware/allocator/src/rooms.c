@@ -14,7 +14,7 @@ static bool open_kind(taper_rooms_t *rooms, const taper_station_config_t *config
 
 void taper_rooms_open(taper_rooms_t *rooms, const taper_station_config_t *config,
                       const taper_supply_t *supply) {
-    rooms->kinds = 0;
+    *rooms = (taper_rooms_t){.kinds = 0};
     for (int kind = 0; kind < TAPER_ROW_SUMS; kind++) {
         if (open_kind(rooms, config, supply, (taper_row_kind_t)kind)) {
             rooms->kind[rooms->kinds++] = (uint8_t)kind;

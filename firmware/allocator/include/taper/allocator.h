@@ -76,7 +76,7 @@ taper_waiting_t taper_allocator_waiting(const taper_allocator_t *allocator, uint
  * Lower currents until no group's imbalance is above its limit: of those on its strongest phase and not on its weakest one,
  * first who is on one phase, from the end of `rank` up, down to the minimum; only if that is not enough, to 0. Nothing is
  * raised. `rank` is [connectors]; whom it does not name is cut first. Cost: O(connectors + groups), and while a group tilts at most
- * connectors x 2 times O(connectors x depth).
+ * (connectors + groups) x 2 times O(connectors x depth).
  */
 void taper_balance(const taper_station_config_t *config, const taper_snapshot_t *snapshot,
                    const uint8_t *rank, taper_setpoints_t *setpoints);
