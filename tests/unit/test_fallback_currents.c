@@ -328,6 +328,19 @@ static void test_when_the_failsafe_limit_falls_who_can_be_reached_gives_up_for_w
     assert_chosen(10000, 0, 0, 6000);
 }
 
+static void test_who_cannot_be_reached_and_is_told_the_same_again_takes_nothing_more(void) {
+    choose(W_of_dA(340));
+    send_and_echo_all();
+    now_ms += EXPIRED_ms;
+    taper_ledger_update(&ledger, now_ms);
+    for (uint8_t i = 1; i < 4; i++) { /* the first one hears nothing, and keeps 10 A */
+        send(i);
+        echo(i);
+    }
+    choose(W_of_dA(280));
+    assert_chosen(10000, 10000, 8000, 0);
+}
+
 static void test_those_who_cannot_be_reached_are_told_no_more_than_fits_for_when_they_can(void) {
     choose(W_of_dA(340));
     send_and_echo_all();
@@ -368,6 +381,7 @@ int main(void) {
     RUN_TEST(test_a_connector_that_costs_nothing_is_bounded_by_nothing);
     RUN_TEST(test_whatever_happens_the_sum_is_within_a_constant_limit);
     RUN_TEST(test_when_the_failsafe_limit_falls_who_can_be_reached_gives_up_for_who_cannot);
+    RUN_TEST(test_who_cannot_be_reached_and_is_told_the_same_again_takes_nothing_more);
     RUN_TEST(test_those_who_cannot_be_reached_are_told_no_more_than_fits_for_when_they_can);
     RUN_TEST(test_beside_those_who_cannot_be_reached_nothing_is_added_while_they_hold_more_than_the_limit);
     return UNITY_END();

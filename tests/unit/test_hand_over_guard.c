@@ -90,6 +90,21 @@ static void test_each_phase_counts_who_is_wired_to_it(void) {
     TEST_ASSERT_TRUE(bench_passes());
 }
 
+static void test_a_connector_of_one_phase_is_on_the_one_that_its_rotation_names_first(void) {
+    static const uint8_t first[7] = {TAPER_ROTATION_123, TAPER_ROTATION_123, TAPER_ROTATION_231,
+                                     TAPER_ROTATION_312, TAPER_ROTATION_123, TAPER_ROTATION_231,
+                                     TAPER_ROTATION_312}; /* a wiring that begins with the same line */
+    groups[1].limit_mA = 16000;
+    bench_grant(0, 10000);
+    for (uint8_t rotation = 0; rotation < 7; rotation++) {
+        connectors[0].rotation = rotation;
+        for (uint8_t line = TAPER_ROTATION_123; line <= TAPER_ROTATION_312; line++) {
+            connectors[1].rotation = line;
+            bench_assert_bound(1, line == first[rotation] ? 6000 : 16000);
+        }
+    }
+}
+
 static void test_three_phases_count_on_each_and_with_single_ones(void) {
     groups[1].limit_mA = 16000;
     connectors[0].phases = 3;
@@ -225,6 +240,7 @@ int main(void) {
     RUN_TEST(test_a_converter_counts_with_its_losses_on_all_phases);
     RUN_TEST(test_a_converter_whose_numbers_are_whole_is_not_rounded);
     RUN_TEST(test_each_phase_counts_who_is_wired_to_it);
+    RUN_TEST(test_a_connector_of_one_phase_is_on_the_one_that_its_rotation_names_first);
     RUN_TEST(test_three_phases_count_on_each_and_with_single_ones);
     RUN_TEST(test_phases_that_were_told_count_instead_of_the_described_ones);
     RUN_TEST(test_the_currents_of_a_group_count_in_its_parents);
