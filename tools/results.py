@@ -188,7 +188,7 @@ def price_table(cases: dict[tuple[str, str], Rows]) -> None:
         energy = 100 * (number(rows, "soc-mpc", "energy_kwh") / number(rows, "llf", "energy_kwh") - 1)
         costs = " | ".join(f"{number(rows, policy, 'cost_per_kwh'):.4f}" for policy in ("llf", "soc-mpc"))
         print(f"| {name} | {100 * float(share):.0f} % | {costs} | {saving_percent(rows):.1f} % "
-              f"| {rows['llf']['satisfied']}, {rows['soc-mpc']['satisfied']} | {energy:+.1f} % |")
+              f"| {rows['llf']['satisfied']}, {rows['soc-mpc']['satisfied']} | {energy:+.2f} % |")
 
 
 def table(title: str, first: str, cases: dict[str, Rows]) -> None:

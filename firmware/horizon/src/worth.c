@@ -97,7 +97,7 @@ static taper_real_t charging_steps(const taper_demand_t *demand, uint16_t step_s
 /**
  * Who leaves soon comes first, and who has little time to spare. The second part sees beyond the horizon, which the rows
  * cannot. Both count less for who cannot get all in time anyway, so that others are not left unsatisfied in vain
- * (docs/results.md, "The weight").
+ * (docs/results.md, "The objective").
  */
 taper_real_t taper_worth_weight(const taper_worth_t *worth, const taper_demand_t *demand) {
     const taper_real_t useful = useful_steps(worth, demand->departs_in_s);
