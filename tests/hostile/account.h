@@ -51,7 +51,7 @@ typedef enum {
     RULE_CURRENT,       /**< neither 0 nor within minimum and maximum */
     RULE_VALIDITY,      /**< not the documented one */
     RULE_TOLD_FALLBACK, /**< above the setpoint or the description, or between 0 and the minimum */
-    RULE_PHASES,        /**< the mask names other conductors than the connector uses, or has */
+    RULE_PHASES,        /**< the mask allows more conductors than the connector uses, or has */
     RULE_SESSION,       /**< current for a session that the connector did not tell, or for nobody */
     RULES,
 } rule_t;
@@ -80,7 +80,9 @@ typedef struct {
         params; /**< of SETPOINT at the connector; of reports at the station */
     bool plugged;
     uint8_t session;
-    uint8_t conductors; /**< that the vehicle says it uses */
+    uint8_t conductors; /**< that the vehicle uses, if it may */
+    uint8_t allowed;    /**< the most that phase masks of lately let it use */
+    int64_t allowed_ms;
     int32_t level_mA, fallback_mA;
     int64_t expires_ms, accepted_ms;
     bool fell_back; /**< nothing is in force any more but the fallback current */

@@ -78,10 +78,10 @@ static void check_fallback(account_t *account) {
     for (unsigned i = 0; i < account->config->connector_count; i++) {
         const book_t *book = &account->book[i];
         if (book->plugged) {
-            add_equally(&told, account, i, book->conductors, book->fallback_mA);
+            add_equally(&told, account, i, account_conductors(account, i), book->fallback_mA);
         }
         if (book->plugged && account->now_ms - book->accepted_ms > DEAF_ms) {
-            add_equally(&deaf, account, i, book->conductors, book->fallback_mA);
+            add_equally(&deaf, account, i, account_conductors(account, i), book->fallback_mA);
         }
     }
     const double failsafe_W = account_most(account, &account->supply.failsafe_history_W, FAILSAFE_WINDOW_ms);
@@ -161,7 +161,7 @@ void account_check(account_t *account) {
     memset(&stuck, 0, sizeof stuck);
     account_supply_note(account);
     for (unsigned i = 0; i < account->config->connector_count; i++) {
-        const unsigned conductors = account->book[i].conductors;
+        const unsigned conductors = account_conductors(account, i);
         account->verdict.vehicles += account->book[i].plugged ? 1u : 0u;
         account->verdict.charging += account->book[i].level_mA > 0 ? 1u : 0u;
         add_equally(&legal, account, i, conductors, account_legal_mA(account, i));

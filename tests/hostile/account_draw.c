@@ -8,6 +8,7 @@ void account_forget(book_t *book) {
     book->fallback_mA = 0;
     book->fell_back = true;
     book->fades = 0;
+    book->allowed = 0;
 }
 
 /** A vehicle may draw `mA` for a while yet. If there are too many of these, the last stands for two. */
@@ -57,6 +58,26 @@ void account_expire(account_t *account) {
     }
 }
 
+static unsigned conductors_of(unsigned phase_mask) {
+    return (phase_mask & 1u) + (phase_mask >> 1 & 1u) + (phase_mask >> 2 & 1u);
+}
+
+/** A wider mask counts at once; a narrower one when the vehicle has followed. */
+static void take_mask(account_t *account, unsigned connector, unsigned phase_mask) {
+    book_t *book = &account->book[connector];
+    const unsigned conductors = conductors_of(phase_mask);
+    const int64_t reaction_ms = account->config->connectors[connector].reaction_ms;
+    if (conductors >= book->allowed || account->now_ms - book->allowed_ms > reaction_ms) {
+        book->allowed = (uint8_t)conductors;
+        book->allowed_ms = account->now_ms;
+    }
+}
+
+unsigned account_conductors(const account_t *account, unsigned connector) {
+    const book_t *book = &account->book[connector];
+    return book->allowed != 0 && book->allowed < book->conductors ? book->allowed : book->conductors;
+}
+
 /** A connector takes a setpoint for the session that it has, or for none without a vehicle. */
 void account_take_setpoint(account_t *account, unsigned connector, const taper_frame_t *frame) {
     book_t *book = &account->book[connector];
@@ -69,6 +90,9 @@ void account_take_setpoint(account_t *account, unsigned connector, const taper_f
     }
     move_level(account, connector, setpoint.command == WIRE_CHARGE ? setpoint.current_mA : 0,
                account->now_ms);
+    if (book->level_mA > 0) {
+        take_mask(account, connector, setpoint.phase_mask);
+    }
     book->fell_back = false;
     book->fallback_mA = setpoint.fallback_mA;
     book->accepted_ms = account->now_ms;

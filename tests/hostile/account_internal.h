@@ -18,6 +18,9 @@ void account_hold(account_t *account, rule_t rule, int group, double limit, doub
 /** What a connector may draw on each of its conductors [mA]. */
 int32_t account_legal_mA(const account_t *account, unsigned connector);
 
+/** Conductors on which a connector may draw that. */
+unsigned account_conductors(const account_t *account, unsigned connector);
+
 /** The part of it that nobody can take back: its fallback current, or what it is leaving of that [mA]. */
 int32_t account_stuck_mA(const account_t *account, unsigned connector);
 

@@ -27,14 +27,14 @@ static unsigned least(unsigned a, unsigned b) {
     return a < b ? a : b;
 }
 
-/** With a current: the conductors that the connector uses, by what the station has heard now or in its last tick. */
+/** With a current: no more conductors than the connector uses, by what the station has heard now or in its last tick. */
 static void judge_phases(account_t *account, unsigned connector, const wire_setpoint_t *setpoint) {
     const book_t *book = &account->book[connector];
     const unsigned wired = account->config->connectors[connector].phases;
     const unsigned conductors = setpoint->phase_mask == 7 ? 3 : setpoint->phase_mask == 3 ? 2 : 1;
     const bool whole = setpoint->phase_mask == (1u << conductors) - 1u && conductors <= wired;
-    const bool used = conductors == least(wired, book->told_conductors) ||
-                      conductors == least(wired, book->tick_conductors);
+    const bool used = conductors <= least(wired, book->told_conductors) ||
+                      conductors <= least(wired, book->tick_conductors);
     expect(account, connector, RULE_PHASES, whole && (used || setpoint->current_mA == 0),
            book->told_conductors, setpoint->phase_mask);
 }

@@ -51,6 +51,7 @@ static void choose_conductors(node_t *node) {
     const uint8_t some = (uint8_t)random_in(node->random, 1, 3);
     node->conductors = wired == 1 || random_once_in(node->random, 2) ? wired : some;
     node->claimed = node->conductors;
+    node->allowed = 0;
     if (wired == 3 && node->lie == LIE_CLAIMS_MORE) {
         node->conductors = 1;
         node->claimed = 3;
@@ -127,6 +128,9 @@ void node_hear(node_t *node, const taper_frame_t *frame, int64_t now_ms) {
     }
     node->echo = setpoint.counter;
     node->fallback_mA = setpoint.fallback_mA;
+    if (setpoint.current_mA > 0) {
+        node->allowed = setpoint.phase_mask == 7 ? 3 : setpoint.phase_mask == 3 ? 2 : 1;
+    }
     node->expires_ms = now_ms + setpoint.validity_ms;
     node->fell_back = false;
     node->open = setpoint.command == WIRE_STOP || setpoint.command == WIRE_EMERGENCY;
@@ -181,10 +185,13 @@ void node_run(node_t *node, int64_t now_ms, int64_t passed_ms) {
         show(node, node->fallback_mA, now_ms);
     }
     const double mA = drawn_mA(node, now_ms);
+    const bool obeys =
+        node->lie != LIE_CLAIMS_FEWER && node->allowed != 0 && node->allowed < node->conductors;
+    const unsigned conductors = obeys ? node->allowed : node->conductors;
     for (unsigned k = 0; k < 3; k++) {
-        node->drawn_mA[k] = k < node->conductors ? mA : 0.0;
+        node->drawn_mA[k] = k < conductors ? mA : 0.0;
     }
-    const double power_W = mA / 1000.0 * node->config->voltage_mV / 1000.0 * node->conductors;
+    const double power_W = mA / 1000.0 * node->config->voltage_mV / 1000.0 * conductors;
     node->drawn_Wh += power_W * (double)passed_ms / 3.6e6;
 }
 

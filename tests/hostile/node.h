@@ -39,7 +39,8 @@ typedef struct {
     uint8_t session, revision;
     int64_t plug_ms; /**< when the next vehicle comes, or this one goes */
     lie_t lie;
-    uint8_t conductors, claimed; /**< used; told */
+    uint8_t conductors, claimed; /**< used, if the phase mask allows it; told */
+    uint8_t allowed; /**< by the phase mask of the last setpoint with a current; 0: none came yet */
     int32_t own_mA, min_mA;
     double over_factor, drawn_Wh, wanted_Wh, capacity_Wh;
     bool absurd, pauses, info_odd;

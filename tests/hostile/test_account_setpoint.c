@@ -114,7 +114,7 @@ static void test_a_fallback_current_that_the_description_does_not_allow_is_a_vio
 }
 
 static void test_a_phase_mask_that_is_not_the_connectors_is_a_violation(void) {
-    expect_objection(bench_frame_with(0, 6000, 48, 3, 1), RULE_PHASES);
+    expect_objection(bench_frame_with(0, 6000, 48, 3, 2), RULE_PHASES); /* L2 alone */
 }
 
 static void test_current_for_a_session_that_nobody_told_is_a_violation(void) {
