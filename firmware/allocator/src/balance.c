@@ -49,9 +49,10 @@ static void sum_phases(const balance_t *balance, int64_t sum_uA[TAPER_MAX_GROUPS
             }
         }
     }
-    for (uint8_t k = config->group_count; k-- > 1;) { /* children stand behind their parents */
-        for (unsigned phase = 0; phase < PHASES; phase++) {
-            sum_uA[config->groups[k].parent][phase] += sum_uA[k][phase];
+    for (uint8_t k = config->group_count; k-- > 0;) { /* children stand behind their parents */
+        const uint8_t parent = config->groups[k].parent;
+        for (unsigned phase = 0; phase < PHASES && parent != TAPER_NO_GROUP; phase++) {
+            sum_uA[parent][phase] += sum_uA[k][phase];
         }
     }
 }
