@@ -38,18 +38,18 @@ taper_event_kind_t taper_event_kind(uint8_t code) {
         KIND(STORE_OLD_COPY, WARNING, NULL);
         KIND(STORE_RESET, ERROR, NULL);
         KIND(EMCY_HEARD, WARNING, "code");
-        KIND(LIMIT_NEGATIVE, WARNING, NULL);
-        KIND(GUARD, ERROR, NULL);
+        KIND(LIMIT_NEGATIVE, WARNING, "limit_W");
+        KIND(GUARD, ERROR, "fallback");
         KIND(IDENTIFIED, INFO, NULL);
-        KIND(PLANNER_OFF, WARNING, NULL);
+        KIND(PLANNER_OFF, WARNING, "verdict");
         KIND(PLANNER_ON, INFO, NULL);
         KIND(TICK_OVERRUN, WARNING, "ms");
         KIND(SETPOINT_FLIP, ERROR, NULL);
         KIND(OVER_DRAW, WARNING, "dA");
         KIND(LOCKED_OUT, WARNING, NULL);
         KIND(PRICE_SET, INFO, "points");
-        KIND(LIMIT_FLAPS, WARNING, NULL);
-        KIND(QUEUED, WARNING, NULL);
+        KIND(LIMIT_FLAPS, WARNING, "before_W");
+        KIND(QUEUED, WARNING, "place");
     }
     return (taper_event_kind_t){NULL, TAPER_LOG_WARNING, "data"};
 }

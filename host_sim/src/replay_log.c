@@ -21,6 +21,7 @@ bool sim_replay_is_of_station(uint16_t id) {
     switch (id >> 6) {
     case TAPER_MESSAGE_SETPOINT:
     case TAPER_MESSAGE_PLAN:
+    case TAPER_MESSAGE_OUTLOOK:
     case TAPER_MESSAGE_ISOTP_TO: return true;
     case TAPER_MESSAGE_EMCY:
     case TAPER_MESSAGE_CTRL_STATUS:

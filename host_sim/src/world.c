@@ -24,6 +24,8 @@
 /** Then rounds come with the pause that setpoints keep between two changes, until deadbands have settled as well. */
 #define LATER_ROUND_ms 5200
 #define SETTLED_ms     (TAPER_SHAPE_SETTLE_ms + 2u * LATER_ROUND_ms)
+/** The longest validity of a setpoint: a tick beyond it ends with one more round, so that none has run out at its end. */
+#define VALIDITY_ms 127000u
 /** The longest curve takes some 1000. */
 #define CURVE_ROUNDS 5000
 
@@ -135,6 +137,18 @@ static uint32_t next_round_ms(const world_t *world, uint32_t passed_ms) {
     return passed_ms < reacted_ms && passed_ms + ROUND_ms > reacted_ms ? reacted_ms : passed_ms + ROUND_ms;
 }
 
+/** Time passes up to `passed_ms` into the tick; echoes in, setpoints out. */
+static bool run_round(world_t *world, int64_t now_s, uint32_t passed_ms, bool whole) {
+    const uint32_t now_ms = (uint32_t)((uint64_t)now_s * 1000U) + passed_ms;
+    sim_account_pass(&world->account, (double)now_s + (double)passed_ms / 1000.0);
+    taper_membus_set_time(&world->bus, now_ms);
+    const bool sent = repeat_reports(world, now_s, passed_ms, whole);
+    taper_station_poll(&world->station, now_ms);
+    sim_fleet_hear(&world->fleet);
+    sim_account_obey(&world->account);
+    return sent;
+}
+
 /**
  * What one connector gives up reaches another: echoes in, time passes until the vehicle is known to have followed,
  * setpoints out; until all have their targets, as their ramps and deadbands allow, or the tick ends.
@@ -147,15 +161,12 @@ static bool hand_over(world_t *world, int64_t now_s) {
     for (unsigned round = 1;
          sent && passed_ms <= end_ms && passed_ms < tick_ms && !taper_station_is_settled(&world->station);
          round++) {
-        const uint32_t now_ms = (uint32_t)((uint64_t)now_s * 1000U) + passed_ms;
-        sim_account_pass(&world->account, (double)now_s + (double)passed_ms / 1000.0);
-        taper_membus_set_time(&world->bus, now_ms);
-        sent = repeat_reports(world, now_s, passed_ms,
-                              round % 2 == 0 || passed_ms > world->reaction_ms + PATIENCE_ms);
-        taper_station_poll(&world->station, now_ms);
-        sim_fleet_hear(&world->fleet);
-        sim_account_obey(&world->account);
+        const bool whole = round % 2 == 0 || passed_ms > world->reaction_ms + PATIENCE_ms;
+        sent = run_round(world, now_s, passed_ms, whole);
         passed_ms = next_round_ms(world, passed_ms);
+    }
+    if (sent && tick_ms > VALIDITY_ms + passed_ms) { // a real station repeats its setpoints all the time
+        sent = run_round(world, now_s, tick_ms - ROUND_ms, true);
     }
     return sent;
 }

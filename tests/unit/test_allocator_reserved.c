@@ -45,6 +45,27 @@ static void test_a_reservation_above_the_limit_leaves_nothing_and_nobody_is_swit
     }
 }
 
+static void test_what_a_connector_draws_anyway_pays_for_its_own_setpoint(void) {
+    snapshot.demand[1].active = false;
+    reserved_mA[0] = 10000;
+    allocate(7360, 25000);
+    TEST_ASSERT_EQUAL_INT32(32000, setpoints.current_mA[0]);
+    snapshot.demand[1].active = true;
+    allocate(7360, 25000); /* 52 A on the feeder: 32 and 20, as if nothing were reserved */
+    TEST_ASSERT_EQUAL_INT32(32000, setpoints.current_mA[0]);
+    TEST_ASSERT_EQUAL_INT32(20000, setpoints.current_mA[1]);
+    reserved_mA[1] = 25000; /* more than it is given: 27 A are left for the other */
+    allocate(7360, 25000);
+    TEST_ASSERT_EQUAL_INT32(27000, setpoints.current_mA[0]);
+    TEST_ASSERT_EQUAL_INT32(25000, setpoints.current_mA[1]);
+}
+
+static void test_a_reservation_pays_for_nothing_where_the_limit_is_exceeded(void) {
+    reserved_mA[0] = 32000;
+    allocate(7360, 7000); /* 7360 W flow; no setpoint makes them legal */
+    TEST_ASSERT_EQUAL_INT32(0, setpoints.current_mA[0]);
+}
+
 static void test_when_the_reservation_ends_the_others_get_it(void) {
     snapshot.demand[0] = (taper_demand_t){0};
     reserved_mA[0] = 32000;
@@ -82,6 +103,8 @@ int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_what_a_silent_connector_may_draw_is_kept_free_for_it);
     RUN_TEST(test_a_reservation_above_the_limit_leaves_nothing_and_nobody_is_switched_on);
+    RUN_TEST(test_what_a_connector_draws_anyway_pays_for_its_own_setpoint);
+    RUN_TEST(test_a_reservation_pays_for_nothing_where_the_limit_is_exceeded);
     RUN_TEST(test_when_the_reservation_ends_the_others_get_it);
     RUN_TEST(test_phases_that_are_not_known_are_booked_three_times);
     RUN_TEST(test_nothing_booked_is_booked_as_drawn);

@@ -9,7 +9,7 @@ import socket
 import struct
 import threading
 import time
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 
 import can
@@ -21,6 +21,8 @@ ALONE = 3  # the connector with a process of its own
 W_PER_dA = 69  # 3 x 230 V x 0.1 A
 LIMIT_W = 60_000
 FAILSAFE_W = 11_000
+FALLBACK_dA = 60
+FALLBACKS = 2  # of 4.14 kW each: the failsafe limit has room for so many
 FAILSAFE = 3  # mode
 ABSENT = 0x8000
 WORLD_S = 1_790_000_000
@@ -45,6 +47,10 @@ class Frame:
     def told_dA(self):
         """Of a SETPOINT: what it lets a vehicle draw."""
         return bits(self.data, 16, 16) if bits(self.data, 12, 4) == CHARGE else 0
+
+    def fallback_dA(self):
+        """Of a SETPOINT: what it lets a vehicle draw once it has expired."""
+        return bits(self.data, 40, 8) * 5
 
     def current_dA(self):
         """Of EVSE_STATUS: what the vehicle draws on the first phase."""
@@ -150,6 +156,14 @@ class Scene:
         """What every connector was told last."""
         return {node: self.bus.last(SETPOINT, node).told_dA() for node in NODES}
 
+    def fallback_dA(self):
+        """The fallback current that every connector was told last."""
+        return {node: self.bus.last(SETPOINT, node).fallback_dA() for node in NODES}
+
+    def current_dA(self):
+        """What every vehicle draws."""
+        return {node: self.bus.last(EVSE_STATUS, node).current_dA() for node in NODES}
+
     def wait_until_all_charge(self):
         """Until each has been told a current since the start: there is enough for all."""
         for node in NODES:
@@ -170,14 +184,16 @@ class Scene:
             raw.bind(("vcan0",))
             raw.send(struct.pack("=IB3x8s", can_id, 8, data))
 
-    def hold(self, running):
+    @contextmanager
+    def held(self, running):
+        """A program that does nothing for a while."""
         running.process.send_signal(signal.SIGSTOP)
-
-    def go_on(self, running):
-        running.process.send_signal(signal.SIGCONT)
+        try:
+            yield
+        finally:
+            running.process.send_signal(signal.SIGCONT)
 
     def close(self):
-        self.go_on(self.alone)
         self.gateway.close()
         self.bus.close()
 

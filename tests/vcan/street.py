@@ -15,7 +15,8 @@ for _value in range(256):
     WIRE_CRC[_value] = _crc
 
 EMCY, SITE_LIMIT, SETPOINT, EVSE_STATUS, EV_STATUS, EVSE_ELEC, SITE_METER, TIME_SYNC, CTRL_STATUS = range(1, 10)
-EV_PARAM_A, EV_PARAM_B, EV_PARAM_C, EVSE_INFO = 10, 11, 12, 13
+EV_PARAM_A, EV_PARAM_B, EV_PARAM_C, EVSE_INFO, PLAN = range(10, 15)
+OUTLOOK = 17
 GATEWAY = 62
 PAUSE, CHARGE = 0, 1
 
@@ -91,11 +92,13 @@ class Connector:
         self.stored_wh = 40000 * chance.uniform(0.2, 0.6)
         self.charged_wh = 0.0
         self.told_da = 0  # current of the last setpoint [0.1 A]
+        self.fallback_da = 0  # and the fallback current that it gave
         self.current_da = 0
         self.echo = 0
 
     def hear(self, data):
         self.told_da = bits(data, 16, 16) if bits(data, 12, 4) == CHARGE else 0
+        self.fallback_da = bits(data, 40, 8) * 5
         self.echo = data[1] & 15
 
     def move(self, seconds):

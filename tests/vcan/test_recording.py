@@ -8,10 +8,9 @@ from pathlib import Path
 
 import can
 import pytest
-import street
 from conftest import PATIENCE_S, program, wait_until
 from daemon_bench import HUB, ear, end, field, listen, only, station, values  # fixtures among them
-from street import CHARGE, CTRL_STATUS, SETPOINT, Bus, Street, bits, is_sound
+from street import CHARGE, CTRL_STATUS, EMCY, OUTLOOK, PLAN, SETPOINT, Bus, Street, bits, is_sound
 
 
 def replay(log, *options):
@@ -75,7 +74,7 @@ def recording(tmp_path_factory):
 def is_sent(identifier):
     """Whether a frame is the station's, by its identifier."""
     function, node = identifier >> 6, identifier & 63
-    return function in (SETPOINT, street.EMCY + 13) or (function in (street.EMCY, CTRL_STATUS) and node == 0)
+    return function in (SETPOINT, PLAN, OUTLOOK) or (function in (EMCY, CTRL_STATUS) and node == 0)
 
 
 def test_each_line_of_the_recording_is_one_of_candump(recording):
@@ -103,7 +102,7 @@ def test_python_can_reads_the_recording(recording):
     assert len(messages) > 1000
     assert {message.channel for message in messages} == {"vcan0"}
     sent = [message for message in messages if is_sent(message.arbitration_id)]
-    assert {message.arbitration_id >> 6 for message in sent} >= {SETPOINT, CTRL_STATUS, street.EMCY + 13}
+    assert {message.arbitration_id >> 6 for message in sent} >= {SETPOINT, CTRL_STATUS, PLAN, OUTLOOK}
     assert all(is_sound(message.arbitration_id, bytes(message.data)) for message in messages)
     times = [message.timestamp for message in sent]
     assert times == sorted(times)

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from conftest import PATIENCE_S, program, wait_until
 from daemon_bench import HUB, ear, end, field, listen, only, station, values  # fixtures among them
-from street import CTRL_STATUS, PAUSE, SETPOINT, bits, is_sound
+from street import CHARGE, CTRL_STATUS, PAUSE, SETPOINT, bits, is_sound
 
 LINE = re.compile(r'^ts=\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z level=(error|warning|info|debug) event=[a-z0-9_-]+'
                   r'( [a-zA-Z0-9_]+=([^" ]+|"([^"\\]|\\.)*"))*$')
@@ -45,18 +45,21 @@ def test_vehicles_charge_by_its_plans_within_the_limit_of_the_command_line(stati
     assert sum(one.told_da for one in street_.connectors) * 69 <= 22000
 
 
-def test_sigterm_tells_every_connector_three_times_to_pause_with_no_fallback_current(station, field, ear):
+def test_sigterm_tells_every_connector_three_times_to_use_its_fallback_current(station, field, ear):
     street_ = field()
     running = station()
-    wait_until(lambda: any(one.told_da for one in street_.connectors), "charging")
+    # 6 A on three phases are 4140 W: the failsafe limit of 11 kW carries two.
+    wait_until(lambda: sum(one.fallback_da for one in street_.connectors) == 120, "fallback currents")
+    listen(ear, 0.5)  # what came meanwhile: its socket may be full
     running.process.send_signal(signal.SIGTERM)
     heard = listen(ear, 2)
     assert running.finish() == 0
+    told = []
     for node in range(1, HUB + 1):
         last = [data for _, identifier, data in heard if identifier == SETPOINT << 6 | node][-3:]
-        assert [bits(data, 12, 4) for data in last] == [PAUSE] * 3
-        assert [bits(data, 16, 16) + bits(data, 40, 8) for data in last] == [0] * 3
+        told.append({(bits(data, 12, 4), bits(data, 16, 16), bits(data, 40, 8) * 5) for data in last})
         assert [(second[1] - first[1]) % 16 for first, second in pairwise(last)] == [1, 1]
+    assert sorted(told, key=str) == [{(PAUSE, 0, 0)}] * 6 + [{(CHARGE, 60, 60)}] * 2
     assert running.lines[-1].endswith("event=stop reason=signal")
 
 
@@ -86,6 +89,7 @@ def test_ticks_that_it_slept_through_are_counted_and_not_made_up_for(station, ea
     running.process.send_signal(signal.SIGCONT)
     overrun = values(running.wait_for("event=overrun").string)
     assert int(overrun["missed_ticks"]) in (2, 3)
+    assert int(values(running.wait_for("event=tick_overrun").string)["ms"]) == int(overrun["missed_ticks"]) * 1000
     assert len(only(listen(ear, 0.5), CTRL_STATUS)) <= 2
 
 
@@ -147,6 +151,16 @@ def test_the_service_manager_hears_of_start_life_and_stop(station, tmp_path, abs
     assert max(after - before for before, after in pairwise(kicks)) < 2.0
 
 
+def test_a_daemon_that_is_late_with_every_tick_leaves_the_watchdog_to_bite(station, tmp_path):
+    with listening(str(tmp_path / "notify")) as manager:
+        running = station(before=("env", f"LD_PRELOAD={program('TAPER_LATE_CLOCK')}"),
+                          env=os.environ | {"NOTIFY_SOCKET": str(tmp_path / "notify"), "WATCHDOG_USEC": "2000000"})
+        for _ in range(4):
+            assert int(values(running.wait_for("event=tick_overrun").string)["ms"]) > 500
+        running.process.send_signal(signal.SIGTERM)
+        assert words_until(manager, "STOPPING=1").count("WATCHDOG=1") <= 2
+
+
 def test_a_watchdog_that_is_not_ours_is_not_kicked(station, tmp_path):
     with listening(str(tmp_path / "notify")) as manager:
         running = station(env=os.environ | {"NOTIFY_SOCKET": str(tmp_path / "notify"), "WATCHDOG_USEC": "2000000",
@@ -174,6 +188,18 @@ def test_every_line_of_the_log_is_logfmt_and_tells_what_happens(station, field):
     summary = values(running.lines[-2])
     assert summary["guard_violations"] == "0"
     assert int(summary["frames_received"]) > 100
+
+
+def test_the_log_tells_of_limits_that_flap_or_are_negative(station, field):
+    street_ = field(limit_w=60000)
+    running = station()
+    running.wait_for("event=mode mode=plan")
+    street_.limit_w = 40000
+    time.sleep(2)
+    street_.limit_w = 50000
+    running.wait_for("event=limit_flaps bus=0 node=62 before_W=40000$")
+    street_.limit_w = (0x10000 - 10) * 100
+    running.wait_for("event=limit_negative bus=0 node=62 limit_W=-1000$")
 
 
 def test_under_journald_each_line_begins_with_its_priority(station):

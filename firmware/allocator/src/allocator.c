@@ -14,6 +14,7 @@ typedef struct {
     taper_rooms_t rooms;
     bool keeps;         /* `kept` is what others leave for one who has waited too long already */
     taper_rooms_t kept; /* until then: the rooms before anybody had anything */
+    int32_t reserved_mA[TAPER_MAX_CONNECTORS];
     int32_t *current_mA;
 } round_t;
 
@@ -21,15 +22,14 @@ void taper_allocator_init(taper_allocator_t *allocator) {
     memset(allocator, 0, sizeof *allocator);
 }
 
-/** Rooms less what connectors that cannot be told anything may still draw. */
+/** Rooms less what connectors draw whatever they are told. */
 static void open_rooms(round_t *round, const taper_supply_t *supply, const int32_t *reserved_mA) {
     taper_rooms_open(&round->rooms, round->config, supply);
     for (uint8_t i = 0; i < round->config->connector_count; i++) {
         const taper_booking_t booking = taper_booking_now(round->config, round->snapshot, i);
         round->weights[i] = taper_rooms_weigh(&round->rooms, &booking);
-        if (reserved_mA != NULL) {
-            taper_rooms_draw(&round->rooms, round->config, i, &round->weights[i], reserved_mA[i]);
-        }
+        round->reserved_mA[i] = reserved_mA == NULL ? 0 : reserved_mA[i];
+        taper_rooms_draw(&round->rooms, round->config, i, &round->weights[i], round->reserved_mA[i]);
     }
     round->keeps = false;
     round->kept = round->rooms;
@@ -46,12 +46,25 @@ static int32_t whole_steps(int32_t current_mA) {
 
 /* ---- Minima, by turns */
 
-static bool fits(const round_t *round, const taper_rooms_t *rooms, uint8_t i, int32_t current_mA) {
-    return taper_rooms_fit_mA(rooms, round->config, i, &round->weights[i], current_mA) >= current_mA;
+/** Of `more_mA` for a connector what its own reservation does not cover. */
+static int32_t unpaid_mA(const round_t *round, uint8_t i, int32_t more_mA) {
+    const int32_t paid_mA = taper_max_i32(round->reserved_mA[i] - round->current_mA[i], 0);
+    return taper_max_i32(more_mA - paid_mA, 0);
 }
 
-static void draw(round_t *round, taper_rooms_t *rooms, uint8_t i, int32_t current_mA) {
-    taper_rooms_draw(rooms, round->config, i, &round->weights[i], current_mA);
+/** How much of `more_mA` fits; negative: a row is overdrawn. */
+static int32_t fitting_mA(const round_t *round, const taper_rooms_t *rooms, uint8_t i, int32_t more_mA) {
+    const int32_t beyond_mA = unpaid_mA(round, i, more_mA);
+    const int32_t fits_mA = taper_rooms_fit_mA(rooms, round->config, i, &round->weights[i], beyond_mA);
+    return fits_mA < 0 ? fits_mA : more_mA - beyond_mA + fits_mA;
+}
+
+static bool fits(const round_t *round, const taper_rooms_t *rooms, uint8_t i, int32_t current_mA) {
+    return fitting_mA(round, rooms, i, current_mA) >= current_mA;
+}
+
+static void draw(round_t *round, taper_rooms_t *rooms, uint8_t i, int32_t more_mA) {
+    taper_rooms_draw(rooms, round->config, i, &round->weights[i], unpaid_mA(round, i, more_mA));
 }
 
 /** Keep room for one who waited too long from those who would be switched on meanwhile; not for what never fits. */
@@ -118,7 +131,7 @@ static void raise(round_t *round, uint8_t i, int32_t target_mA) {
     if (more_mA < TAPER_CURRENT_STEP_mA) {
         return;
     }
-    const int32_t fits_mA = taper_rooms_fit_mA(&round->rooms, round->config, i, &round->weights[i], more_mA);
+    const int32_t fits_mA = fitting_mA(round, &round->rooms, i, more_mA);
     if (fits_mA >= TAPER_CURRENT_STEP_mA) {
         draw(round, &round->rooms, i, whole_steps(fits_mA));
         round->current_mA[i] = present_mA + whole_steps(fits_mA);

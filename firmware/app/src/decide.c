@@ -107,21 +107,15 @@ static void propose(taper_station_t *station, taper_mode_t mode) {
     }
 }
 
-/** Whether a connector reports, and says that it draws its fallback current: it may be deaf. */
-static bool is_deaf(const taper_station_t *station, uint8_t i) {
-    return station->sessions.session[i].status.fallback_active &&
-           taper_ledger_unreached_mA(&station->ledger, i) > 0;
-}
-
-/** What a connector draws beside its target: all of it if it cannot be told anything, else what it takes too much. */
+/** What a connector draws whatever it is told: all that it may if it is silent or has to stop, what it takes if that is too
+    much, or the fallback current of one that reports but is not known to hear us. */
 static int32_t reserve_mA(const taper_station_t *station, uint8_t i, uint32_t now_ms) {
     const bool obeys =
         taper_session_is_online(&station->sessions, i, now_ms) && station->draw[i].state == TAPER_DRAW_NORMAL;
-    if (!obeys || is_deaf(station, i)) {
+    if (!obeys) {
         return taper_ledger_may_mA(&station->ledger, i);
     }
-    const int32_t drawn_mA = station->ledger.entry[i].drawn_mA;
-    return taper_max_i32(drawn_mA - taper_ledger_told_mA(&station->ledger, i), 0);
+    return taper_max_i32(station->ledger.entry[i].drawn_mA, taper_ledger_unreached_mA(&station->ledger, i));
 }
 
 /** Currents for the proposal that hold every limit, once all connectors have followed. */

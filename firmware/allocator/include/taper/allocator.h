@@ -59,8 +59,8 @@ void taper_allocator_init(taper_allocator_t *allocator);
 
 /**
  * Bound `proposal` by the limits of connectors, vehicles and groups; `supply` (negative counts as 0) bounds group 0
- * besides its own limits. `reserved_mA` [connectors] is kept free for connectors that are silent, but may still draw;
- * NULL: nothing. Times are those of the snapshot.
+ * besides its own limits. `reserved_mA` [connectors] is what each draws whatever it is told: silent, deaf, or out of hand;
+ * its own setpoint counts up to that without more room. NULL: nothing. Times are those of the snapshot.
  * Cost: O(connectors x depth of the tree), a few times, and O(connectors^2) comparisons at worst for the order. Stack: about
  * 60 bytes per connector and 220 per group.
  */
