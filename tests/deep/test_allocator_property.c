@@ -156,7 +156,8 @@ static void assert_group_holds(uint8_t k) {
     TEST_ASSERT_TRUE(k > 0 || flow.power_W <= fmax(tree.supply.site_W, 0) + SLACK);
     for (unsigned line = 0; line < 3; line++) {
         const double line_A = length(flow.line_A[line]) + flow.other_A[line];
-        const double x_A = flow.other_A[line], y_A = flow.other_A[(line + 2) % 3]; /* windings, 60 degrees apart */
+        const double x_A = flow.other_A[line],
+                     y_A = flow.other_A[(line + 2) % 3]; /* windings, 60 degrees apart */
         const double delta_A = length(flow.delta_A[line]) + sqrt(x_A * x_A + x_A * y_A + y_A * y_A);
         const double apart_A = fabs(flow.sum_A[line] - flow.sum_A[(line + 1) % 3]);
         TEST_ASSERT_TRUE(group->limit_mA == 0 || line_A <= group->limit_mA / 1000.0 + SLACK);
