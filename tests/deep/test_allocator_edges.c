@@ -169,8 +169,36 @@ static void test_who_is_on_stays_on_although_room_is_kept(void) {
     tree_assert_on(&tree, "03");
 }
 
+/** Two connectors, 0 draws `reserved_mA` whatever it is told; the site has room for `site_W`. */
+static void allocate_beside(int32_t reserved_mA, int32_t site_W) {
+    const int32_t reserved[TAPER_MAX_CONNECTORS] = {reserved_mA};
+    tree_init(&tree);
+    memset(&tree.setpoints, 0, sizeof tree.setpoints);
+    tree_add(&tree, 0, L1);
+    tree_add(&tree, 0, L1);
+    tree.supply.site_W = site_W;
+    taper_allocate(&tree.allocator, &tree.config, &tree.snapshot, &tree.proposal, &tree.supply, reserved,
+                   &tree.setpoints);
+}
+
+static void test_what_a_connector_draws_anyway_pays_for_its_setpoint_to_the_last_step(void) {
+    allocate_beside(10000, 52 * 230); /* as if nothing were reserved */
+    TEST_ASSERT_EQUAL_INT32(32000, tree.setpoints.current_mA[0]);
+    TEST_ASSERT_EQUAL_INT32(20000, tree.setpoints.current_mA[1]);
+    allocate_beside(20000,
+                    26 * 230); /* what it draws beyond its minimum is paid for, the other has the rest */
+    TEST_ASSERT_EQUAL_INT32(20000, tree.setpoints.current_mA[0]);
+    TEST_ASSERT_EQUAL_INT32(6000, tree.setpoints.current_mA[1]);
+    allocate_beside(20000, 20 * 230);
+    TEST_ASSERT_EQUAL_INT32(20000, tree.setpoints.current_mA[0]);
+    TEST_ASSERT_EQUAL_INT32(0, tree.setpoints.current_mA[1]);
+    allocate_beside(20000, 20 * 230 - 1); /* more than there is: that makes nothing legal */
+    TEST_ASSERT_EQUAL_INT32(0, tree.setpoints.current_mA[0]);
+}
+
 int main(void) {
     UNITY_BEGIN();
+    RUN_TEST(test_what_a_connector_draws_anyway_pays_for_its_setpoint_to_the_last_step);
     RUN_TEST(test_an_allocator_begins_with_nothing);
     RUN_TEST(test_what_is_reserved_beyond_the_last_connector_is_nothing);
     RUN_TEST(test_a_negative_wish_gives_nothing_and_a_great_one_is_exact);

@@ -48,11 +48,23 @@ static void test_a_turn_lasts_longer_than_the_hand_over_to_it(void) {
     tree.config.min_on_ms = tree.config.min_off_ms = 0;
     tree.config.turn_ms = 1000;
     tree.config.change_ms = 2000;
-    tree.connector[0].reaction_ms = 5000;
-    tree.connector[1].reaction_ms = 4000;
+    tree.connector[0].reaction_ms = 4000;
+    tree.connector[1].reaction_ms = 5000;
     tree_allocate(&tree);
     tree_assert_on(&tree, "0");
     tree_allocate_after(&tree, 13999);
+    tree_assert_on(&tree, "0");
+    tree_allocate_after(&tree, 1);
+    tree_assert_on(&tree, "1");
+}
+
+static void test_without_a_reaction_a_turn_is_as_long_as_described(void) {
+    tree_start(&tree, 2, 1);
+    tree.config.min_on_ms = tree.config.min_off_ms = 0;
+    tree.config.turn_ms = 1000;
+    tree.config.change_ms = 2000;
+    tree_allocate(&tree);
+    tree_allocate_after(&tree, 999);
     tree_assert_on(&tree, "0");
     tree_allocate_after(&tree, 1);
     tree_assert_on(&tree, "1");
@@ -105,6 +117,7 @@ int main(void) {
     RUN_TEST(test_the_least_battery_that_is_full_takes_nothing);
     RUN_TEST(test_who_takes_a_watt_can_charge);
     RUN_TEST(test_a_turn_lasts_longer_than_the_hand_over_to_it);
+    RUN_TEST(test_without_a_reaction_a_turn_is_as_long_as_described);
     RUN_TEST(test_the_least_minimum_needs_a_turn);
     RUN_TEST(test_who_is_on_stays_for_the_last_of_what_it_is_owed);
     RUN_TEST(test_a_queue_begins_empty);
