@@ -127,13 +127,13 @@ static taper_candidate_t by_laxity(taper_stage_t stage, const taper_demand_t *de
 
 /** Of a shorter turn, the hand-over would leave nothing: it would be over before the current came. */
 static uint32_t whole_turn_ms(const taper_station_config_t *config) {
-    uint32_t reaction_ms = 0;
+    uint32_t turn_ms = config->turn_ms;
     for (uint8_t i = 0; i < config->connector_count; i++) {
-        const uint32_t own_ms = config->connectors[i].reaction_ms;
-        reaction_ms = own_ms > reaction_ms ? own_ms : reaction_ms;
+        const uint32_t reaction_ms = config->connectors[i].reaction_ms;
+        const uint32_t least_ms = reaction_ms == 0 ? 0 : 2u * (reaction_ms + config->change_ms);
+        turn_ms = least_ms > turn_ms ? least_ms : turn_ms;
     }
-    const uint32_t least_ms = reaction_ms == 0 ? 0 : 2u * (reaction_ms + config->change_ms);
-    return config->turn_ms > least_ms ? config->turn_ms : least_ms;
+    return turn_ms;
 }
 
 static taper_candidate_t candidate_of(const taper_turn_t *turn, const taper_station_config_t *config,
