@@ -244,10 +244,6 @@ static void test_each_connector_by_itself(void) {
     TEST_ASSERT_EQUAL_INT32(10000, shaped.current_mA[1]);
     TEST_ASSERT_EQUAL_INT32(6000, shaped.current_mA[2]);
     TEST_ASSERT_EQUAL_INT32(17000, shaped.current_mA[3]);
-    TEST_ASSERT_FALSE(taper_shape_holds(&target, &shaped, 0));
-    TEST_ASSERT_TRUE(taper_shape_holds(&target, &shaped, 1));
-    shaped.current_mA[1] = 30001;
-    TEST_ASSERT_FALSE(taper_shape_holds(&target, &shaped, 1));
 }
 
 static void test_the_greatest_numbers_of_a_description_overflow_nothing(void) {

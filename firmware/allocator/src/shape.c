@@ -72,7 +72,3 @@ void taper_shape_bound(const taper_shape_t *shape, const taper_station_config_t 
         shaped->current_mA[i] = current_mA < min_mA ? 0 : current_mA - current_mA % TAPER_CURRENT_STEP_mA;
     }
 }
-
-bool taper_shape_holds(const taper_setpoints_t *target, const taper_setpoints_t *shaped, uint8_t connector) {
-    return shaped->current_mA[connector] < target->current_mA[connector];
-}

@@ -141,7 +141,8 @@ void taper_station_seal(taper_station_t *station) {
     }
 }
 
-bool taper_station_is_sealed(const taper_station_t *station) {
+/** Whether setpoints and fallback currents are as they were decided. */
+static bool is_sealed(const taper_station_t *station) {
     int32_t differs = 0;
     for (uint8_t i = 0; i < station->options.config->connector_count; i++) {
         differs |= station->inverse.current_mA[i] ^ ~station->setpoints.current_mA[i];
@@ -223,7 +224,7 @@ void taper_station_regrant(taper_station_t *station, uint32_t now_ms) {
 }
 
 void taper_station_check_seal(taper_station_t *station, uint32_t now_ms) {
-    if (taper_station_is_sealed(station)) {
+    if (is_sealed(station)) {
         return;
     }
     taper_self_flipped(&station->self);

@@ -48,10 +48,7 @@ void taper_station_regrant(taper_station_t *station, uint32_t now_ms);
 /** Keep the inverse of the setpoints and fallback currents beside them. */
 void taper_station_seal(taper_station_t *station);
 
-/** Whether they are as they were decided. */
-bool taper_station_is_sealed(const taper_station_t *station);
-
-/** Fault 48: if not, they are worked out again. */
+/** Fault 48: if they are not as they were decided, they are worked out again. */
 void taper_station_check_seal(taper_station_t *station, uint32_t now_ms);
 
 /* phases.c */

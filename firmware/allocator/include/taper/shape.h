@@ -43,7 +43,4 @@ void taper_shape_bound(const taper_shape_t *shape, const taper_station_config_t 
                        const taper_snapshot_t *snapshot, const taper_setpoints_t *target, uint32_t now_ms,
                        taper_setpoints_t *shaped);
 
-/** Whether it holds a connector below its target. */
-bool taper_shape_holds(const taper_setpoints_t *target, const taper_setpoints_t *shaped, uint8_t connector);
-
 #endif
