@@ -1,5 +1,6 @@
 #include "scene.h"
 #include "taper/battery.h"
+#include "taper/battery_slope.h"
 #include "unity.h"
 
 void setUp(void) {}

@@ -1,5 +1,7 @@
 #include "taper/battery.h"
 
+#include "taper/battery_slope.h"
+
 static int64_t divide_up(int64_t numerator, int64_t denominator) {
     return (numerator + denominator - 1) / denominator;
 }

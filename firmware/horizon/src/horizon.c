@@ -4,6 +4,8 @@
 
 #include "sums.h"
 #include "taper/battery.h"
+#include "taper/battery_slope.h"
+#include "taper/real_math.h"
 #include "worth.h"
 
 /** What one connector brings into the problem, per unit. */

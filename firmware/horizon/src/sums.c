@@ -2,6 +2,8 @@
 
 #include <tgmath.h>
 
+#include "taper/real_math.h"
+
 /** What makes the unit of a sum, W or mA, one of power: per W, or in V per thousand. */
 static taper_real_t power_per_unit(const taper_station_config_t *config, taper_row_kind_t kind) {
     return kind == TAPER_ROW_POWER ? 1 : (taper_real_t)config->site_voltage_mV / 1000000;

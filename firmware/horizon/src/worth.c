@@ -4,6 +4,7 @@
 
 #include "taper/battery.h"
 #include "taper/horizon.h"
+#include "taper/real_math.h"
 
 /** Discount of the worth where a price counts: having energy early must not outweigh having it cheaply. */
 #define PRICED_DISCOUNT ((taper_real_t)0.99)

@@ -7,6 +7,7 @@
 #include "project.h"
 #include "residual.h"
 #include "solver.h"
+#include "taper/real_math.h"
 #include "warm_start.h"
 
 _Static_assert(sizeof(OSQPFloat) == sizeof(taper_real_t),

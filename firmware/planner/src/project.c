@@ -1,5 +1,7 @@
 #include "project.h"
 
+#include "taper/real_math.h"
+
 /** Rounds of lowering the stronger phase. Two settle one group of connectors on single phases. */
 #define BALANCE_ROUNDS 4
 

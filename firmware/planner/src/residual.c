@@ -2,6 +2,8 @@
 
 #include <math.h>
 
+#include "taper/real_math.h"
+
 /** The greater one; once NaN, always NaN. */
 static taper_real_t worse(taper_real_t worst, taper_real_t violation) {
     return violation <= worst || isnan(worst) ? worst : violation;

@@ -12,7 +12,6 @@
 
 #include <stdint.h>
 
-#include "taper/real.h"
 #include "taper/types.h"
 
 /** Most that the vehicle takes at its present SOC [W], >= 0, rounded up. Integer arithmetic. */
@@ -23,8 +22,5 @@ int32_t taper_battery_limit_W(const taper_demand_t *demand);
  * battery takes, and what completes the need within the tick, rounded up. 0 for an inactive demand.
  */
 int32_t taper_battery_useful_W(const taper_demand_t *demand, uint32_t tick_ms);
-
-/** Fall of the limit per energy charged: `a` in `u + a x <= p` [1/h], >= 0. */
-taper_real_t taper_battery_slope_per_h(const taper_demand_t *demand);
 
 #endif

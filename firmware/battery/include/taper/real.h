@@ -15,14 +15,6 @@ typedef float taper_real_t;
 /** "No bound". What every solver of the family takes for infinite. */
 #define TAPER_REAL_UNBOUNDED ((taper_real_t)1e30)
 
-static inline taper_real_t taper_real_min(taper_real_t a, taper_real_t b) {
-    return a < b ? a : b;
-}
-
-static inline taper_real_t taper_real_max(taper_real_t a, taper_real_t b) {
-    return a > b ? a : b;
-}
-
 /** Whole watts of a real of any value, rounded: NaN and what is not positive gives 0, what is too large `most_W`. */
 int32_t taper_real_to_W(taper_real_t value, int32_t most_W);
 

@@ -1,0 +1,11 @@
+/** The taper as the horizon needs it, in floating point; the rest of it is integers (`taper/battery.h`). */
+#ifndef TAPER_BATTERY_SLOPE_H
+#define TAPER_BATTERY_SLOPE_H
+
+#include "taper/real.h"
+#include "taper/types.h"
+
+/** Fall of the limit per energy charged: `a` in `u + a x <= p` [1/h], >= 0. */
+taper_real_t taper_battery_slope_per_h(const taper_demand_t *demand);
+
+#endif

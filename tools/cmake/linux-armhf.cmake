@@ -1,0 +1,4 @@
+# Linux on 32-bit Arm with hard float (Debian armhf), such as an i.MX6.
+set(CMAKE_SYSTEM_NAME Linux)
+set(CMAKE_SYSTEM_PROCESSOR armv7l)
+set(CMAKE_C_COMPILER arm-linux-gnueabihf-gcc)
