@@ -141,6 +141,12 @@ static void take_clock(void) {
     mps2_boot()->is_driven = true;
 }
 
+static void forget_frames(mps2_board_t *board) {
+    taper_frame_t frame;
+    while (board->can.receive(board->can.context, &frame)) {
+    }
+}
+
 /** Both parts of the settings are there with the second one. A new station knows nothing of an earlier one. */
 static void obey_setup(mps2_board_t *board, const taper_slcan_message_t *message, uint8_t part) {
     take_clock();
@@ -148,6 +154,7 @@ static void obey_setup(mps2_board_t *board, const taper_slcan_message_t *message
     if (taper_drive_get_setup(message, &board->setup) && part == 1) {
         mps2_boot()->setup = board->setup;
         mps2_store_erase();
+        forget_frames(board);
         (void)mps2_board_make_station(board);
         say_done(board, TAPER_DRIVE_SETUP, 0);
     }

@@ -1,6 +1,7 @@
 /* Vector table and reset. */
 #include "fault.h"
 #include "memory.h"
+#include "protect.h"
 #include "registers.h"
 #include "stack.h"
 
@@ -73,6 +74,7 @@ void mps2_reset_entry(void) {
     mps2_stack_paint();
     copy_data();
     zero_bss();
+    mps2_protect_start();
     (void)main();
     mps2_reset();
 }
