@@ -47,5 +47,6 @@ install(FILES ${PROJECT_BINARY_DIR}/taper-config.cmake ${PROJECT_BINARY_DIR}/tap
     DESTINATION ${package_dir} COMPONENT library)
 
 file(RELATIVE_PATH to_prefix /prefix/${CMAKE_INSTALL_LIBDIR}/pkgconfig /prefix)
+string(REGEX REPLACE "/$" "" to_prefix "${to_prefix}")
 configure_file(${CMAKE_CURRENT_LIST_DIR}/taper.pc.in ${PROJECT_BINARY_DIR}/taper.pc @ONLY)
 install(FILES ${PROJECT_BINARY_DIR}/taper.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT library)
