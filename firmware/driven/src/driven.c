@@ -18,8 +18,14 @@ static void send(taper_driven_t *driven, taper_slcan_message_t message) {
     taper_slcan_send_extended(driven->slcan, &message);
 }
 
-static void greet(taper_driven_t *driven) {
-    send(driven, taper_drive_u32(TAPER_DRIVE_HELLO, 0, TAPER_DRIVE_VERSION));
+/** Whoever opened the channel, or found it open after a reset. */
+static void greet_newcomer(taper_driven_t *driven) {
+    const taper_slcan_t *slcan = driven->slcan;
+    if (slcan->is_open && (!driven->was_open || slcan->opens != driven->opens)) {
+        send(driven, taper_drive_u32(TAPER_DRIVE_HELLO, 0, TAPER_DRIVE_VERSION));
+    }
+    driven->was_open = slcan->is_open;
+    driven->opens = slcan->opens;
 }
 
 static uint32_t instructions(const taper_driven_t *driven) {
@@ -202,7 +208,6 @@ static void obey(taper_driven_t *driven, const taper_slcan_message_t *message) {
     }
     switch (kind) {
     case TAPER_DRIVE_SETUP: take_setup(driven, message, index); break;
-    case TAPER_DRIVE_GREET: greet(driven); break;
     case TAPER_DRIVE_TIME: driven->now_ms = taper_drive_get_u32(message); break;
     case TAPER_DRIVE_STEP:
     case TAPER_DRIVE_POLL:
@@ -221,10 +226,7 @@ static void obey(taper_driven_t *driven, const taper_slcan_message_t *message) {
 static bool serve_one(taper_driven_t *driven, uint32_t now_ms) {
     taper_slcan_message_t message;
     taper_slcan_pump(driven->slcan, driven->is_driven ? driven->now_ms : now_ms);
-    if (driven->slcan->is_open && !driven->was_open) {
-        greet(driven);
-    }
-    driven->was_open = driven->slcan->is_open;
+    greet_newcomer(driven);
     if (!taper_slcan_take_extended(driven->slcan, &message)) {
         return false;
     }

@@ -39,6 +39,7 @@ typedef struct {
     taper_station_options_t options; /**< as the board runs by itself */
     taper_driven_board_t board;
     bool was_open;  /**< the channel, when last looked at */
+    uint32_t opens; /**< of it, by then */
     bool is_driven; /**< somebody else has the clock */
     bool is_ready;  /**< the station took its settings, and may be called */
     uint32_t now_ms;

@@ -25,8 +25,6 @@
 typedef enum {
     TAPER_DRIVE_SETUP =
         0x01, /**< a new station with the settings that follow; DONE says whether it was taken */
-    TAPER_DRIVE_GREET =
-        0x02, /**< HELLO, by which one that attaches to a channel already open knows the board */
     TAPER_DRIVE_TIME = 0x03,    /**< u32: reception time of the frames that follow [ms]; no answer */
     TAPER_DRIVE_STEP = 0x04,    /**< u32: now [ms]; DONE */
     TAPER_DRIVE_POLL = 0x05,    /**< u32: now [ms]; DONE */
