@@ -1,0 +1,44 @@
+"""As much of gdb's remote protocol as it takes to change an instruction of a running image."""
+
+import socket
+import subprocess
+from pathlib import Path
+
+
+class Debugger:
+    """Attached to the emulator's stub: the board stands still until the end of the block."""
+
+    def __init__(self, port: int):
+        self._socket = socket.create_connection(("127.0.0.1", port), 10.0)
+
+    def __enter__(self) -> "Debugger":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._ask("D")
+        self._socket.close()
+
+    def _ask(self, command: str) -> str:
+        self._socket.sendall(f"${command}#{sum(command.encode()) % 256:02x}".encode())
+        answer = b""
+        while b"#" not in answer[:-2]:
+            data = self._socket.recv(4096)
+            assert data, "the emulator's stub is gone"
+            answer += data
+        self._socket.sendall(b"+")
+        return answer.partition(b"$")[2].rpartition(b"#")[0].decode()
+
+    def write(self, address: int, data: bytes) -> None:
+        """Anywhere, code too. A reset loads the image's code again."""
+        assert self._ask(f"M{address:x},{len(data):x}:{data.hex()}") == "OK"
+
+
+def address_of(image: Path, function: str) -> int:
+    symbols = subprocess.run(["arm-none-eabi-nm", str(image)], check=True, capture_output=True, text=True).stdout
+    found = [line.split()[0] for line in symbols.splitlines() if line.split()[-2:] in (["T", function], ["t", function])]
+    assert found, f"{image} has no function {function}"
+    return int(found[0], 16)
+
+
+def thumb(*halfwords: int) -> bytes:
+    return b"".join(halfword.to_bytes(2, "little") for halfword in halfwords)
