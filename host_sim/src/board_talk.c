@@ -122,7 +122,8 @@ bool sim_board_open(sim_board_talk_t *talk, const char *address, unsigned timeou
     char reason[200];
     taper_slcan_message_t hello;
     *talk = (sim_board_talk_t){.address = address, .timeout_ms = timeout_s * 1000u};
-    if (!sim_slcan_connect(&talk->line, address, CONNECT_ms, reason, sizeof reason)) {
+    const unsigned patience_ms = talk->timeout_ms < CONNECT_ms ? talk->timeout_ms : CONNECT_ms;
+    if (!sim_slcan_connect(&talk->line, address, patience_ms, reason, sizeof reason)) {
         fprintf(stderr, "taper-sim: --bus: %s\n", reason);
         return false;
     }

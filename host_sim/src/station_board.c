@@ -131,7 +131,7 @@ static bool call(board_t *board, taper_drive_kind_t kind, const char *name, uint
     taper_slcan_message_t answer;
     taper_drive_done_t done = {.ok = false};
     char what[60];
-    snprintf(what, sizeof what, "the end of %s at %lu ms", name, (unsigned long)now_ms);
+    snprintf(what, sizeof what, "the end of %s at %.1f s", name, now_ms / 1000.0);
     say(board, taper_drive_u32(kind, 0, now_ms));
     if (!sim_board_await(&board->talk, TAPER_DRIVE_DONE, (uint8_t)kind, what, &answer)) {
         return false;

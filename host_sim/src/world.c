@@ -250,7 +250,7 @@ static bool change_vehicles(world_t *world, int64_t now_s) {
 /** The tick is over: what was drawn in it, and why, as the station tells. */
 static bool end_tick(world_t *world) {
     taper_outlook_t outlook[TAPER_MAX_CONNECTORS];
-    bool wanted[TAPER_MAX_CONNECTORS];
+    bool wanted[TAPER_MAX_CONNECTORS] = {false};
     const bool records = world->results->connectors.stream != NULL;
     for (unsigned i = 0; i < world->run->station->connector_count; i++) {
         wanted[i] = world->fleet.evse[i].vehicle != NULL;
