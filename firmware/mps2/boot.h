@@ -5,15 +5,12 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "taper/drive.h"
-
 typedef struct {
-    uint32_t magic;            /**< a mark: the power stayed on */
-    uint32_t starts;           /**< since power-on */
-    uint32_t fault;            /**< number of the exception that is ending this run; 0: none */
-    bool is_driven;            /**< a simulation has the clock */
-    bool channel_is_open;      /**< of SLCAN, in both directions: who opened it need not notice a reset */
-    taper_drive_setup_t setup; /**< of a driven station, for RESUME */
+    uint32_t magic;       /**< a mark: the power stayed on */
+    uint32_t starts;      /**< since power-on */
+    uint32_t fault;       /**< number of the exception that is ending this run; 0: none */
+    bool is_driven;       /**< a simulation has the clock */
+    bool channel_is_open; /**< of SLCAN, in both directions: who opened it need not notice a reset */
 } mps2_boot_t;
 
 /** Call it once, at the start. @return exception that ended the run before; 0: it was none. */

@@ -2,12 +2,12 @@
 #ifndef MPS2_FREE_RUN_H
 #define MPS2_FREE_RUN_H
 
-#include "board.h"
+#include "taper/station.h"
 
-/** Make the station, with its own settings, and start the watchdog. */
-void mps2_free_run_start(mps2_board_t *board);
+/** Bring the station up, and start the watchdog. A station that refuses its description stays silent. */
+void mps2_free_run_start(taper_station_t *station, const taper_station_options_t *options);
 
 /** What is due at `now_ms`: a step, or a poll. */
-void mps2_free_run_call(mps2_board_t *board, uint32_t now_ms);
+void mps2_free_run_call(taper_station_t *station, uint32_t now_ms);
 
 #endif

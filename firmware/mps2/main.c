@@ -3,7 +3,6 @@
 #include "boot.h"
 #include "clock.h"
 #include "core.h"
-#include "driven.h"
 #include "free_run.h"
 #include "taper/stations.h"
 #include "text.h"
@@ -18,14 +17,6 @@ static void tell_start(uint32_t fault) {
     mps2_text_u32("starts", mps2_boot()->starts);
     mps2_text_u32("after_exception", fault);
     mps2_text("\n");
-}
-
-/** All that came: frames into their queue, messages obeyed. */
-static void take_in(void) {
-    taper_slcan_message_t message;
-    while (mps2_board_pump(&board, mps2_driven_is_on() ? mps2_driven_time_ms() : mps2_clock_ms(), &message)) {
-        mps2_driven_obey(&board, &message);
-    }
 }
 
 /** Until the next millisecond, or byte. */
@@ -43,15 +34,14 @@ int main(void) {
     mps2_clock_start();
     mps2_uart_start();
     mps2_board_start(&board);
-    if (!mps2_driven_is_on()) {
-        mps2_free_run_start(&board);
-    } else {
+    if (mps2_boot()->is_driven) {
         mps2_clock_stop();
+    } else {
+        mps2_free_run_start(&board.station, &board.options);
     }
     for (;;) {
-        take_in();
-        if (!mps2_driven_is_on()) {
-            mps2_free_run_call(&board, mps2_clock_ms());
+        if (!mps2_board_serve(&board)) {
+            mps2_free_run_call(&board.station, mps2_clock_ms());
         }
         sleep();
     }
