@@ -141,6 +141,7 @@ static int load_and_run(const sim_options_t *options, const taper_station_config
                                 .sessions = &sessions,
                                 .limits = &limits,
                                 .prices = options->price_file == NULL ? NULL : &prices,
+                                .iterations = options->replay.setup.iterations,
                                 .seed = options->seed,
                                 .link = link,
                                 .problems = logs.problems,

@@ -76,12 +76,12 @@ enum {
     KEY_FRAMES,
     KEY_BUS,
     KEY_BUS_TIMEOUT,
+    KEY_ITERATIONS,
     KEY_REPLAY_LOG, // the first that only a replay knows
     KEY_CAN,
     KEY_FAILSAFE,
     KEY_TICK_MS,
     KEY_TIME_SCALE,
-    KEY_ITERATIONS,
     KEY_NO_PLANNER, // the last of them
 };
 
@@ -96,6 +96,11 @@ static const struct argp_option options[] = {
     {"price-weight", KEY_PRICE_WEIGHT, "W", 0,
      "Weight of the price against having energy early, 0..1 (default: the station's own)", 0},
     {"tick-s", KEY_TICK, "N", 0, "Control tick [s], 1..3600 (default: 60)", 0},
+    {"iterations", KEY_ITERATIONS, "N", 0,
+     "Solver iterations in a control tick; fewer than 10 bound its work (default: a whole solve in ticks of "
+     "10 s and "
+     "more, otherwise 50; in a replay as recorded)",
+     0},
     {"min-current-a", KEY_MINIMUM, "X", 0,
      "Least current per phase [A] of every connector; 0: any (default: the station's own)", 0},
     {"seed", KEY_SEED, "N", 0, "Decides in which order nodes send; no result depends on it (default: 0)", 0},
@@ -119,7 +124,6 @@ static const struct argp_option options[] = {
     {"failsafe-kw", KEY_FAILSAFE, "X", 0, "As taper-station was told", 1},
     {"tick-ms", KEY_TICK_MS, "N", 0, "As taper-station was told", 1},
     {"time-scale", KEY_TIME_SCALE, "S", 0, "As taper-station was told", 1},
-    {"iterations", KEY_ITERATIONS, "N", 0, "As taper-station was told", 1},
     {"no-planner", KEY_NO_PLANNER, NULL, 0, "As taper-station was told", 1},
     {0},
 };
@@ -172,7 +176,7 @@ static const char *name_of(int key) {
 
 /** Both kinds of run know --station and --limit-kw. */
 static bool is_of_both(int key) {
-    return key == KEY_STATION || key == KEY_LIMIT;
+    return key == KEY_STATION || key == KEY_LIMIT || key == KEY_ITERATIONS;
 }
 
 static bool is_of_replay(int key) {

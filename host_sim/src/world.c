@@ -69,7 +69,8 @@ static bool start_station(const world_t *world) {
         .config = run->station,
         .solver = run->solver,
         .policy = run->policy,
-        .iterations_per_tick = taper_setup_iterations(run->station->tick_ms),
+        .iterations_per_tick =
+            run->iterations > 0 ? run->iterations : taper_setup_iterations(run->station->tick_ms),
     };
     return world->link->calls->start(world->link, &setup);
 }
