@@ -1,9 +1,10 @@
 /* Settings of a site: applied all or none, and kept in the store whatever happens to one copy of it. */
-#include "taper/settings.h"
+#include "taper/planner.h"
 
 #include <string.h>
 
 #include "taper/membus.h"
+#include "taper/planner.h"
 #include "taper/stations.h"
 #include "unity.h"
 
