@@ -1,5 +1,5 @@
 /* Settings of a site: applied all or none, and kept in the store whatever happens to one copy of it. */
-#include "taper/planner.h"
+#include "taper/settings.h"
 
 #include <string.h>
 
