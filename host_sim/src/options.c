@@ -283,7 +283,7 @@ static bool parse_replay(int key, const char *text, sim_replay_options_t *replay
         setup->time_scale = whole("--time-scale", text, 1, TAPER_MAX_TIME_SCALE, state);
         break;
     case KEY_ITERATIONS:
-        setup->iterations = whole("--iterations", text, TAPER_MIN_SLICE, TAPER_MAX_ITERATIONS, state);
+        setup->iterations = whole("--iterations", text, 1, TAPER_MAX_ITERATIONS, state);
         break;
     case KEY_NO_PLANNER: setup->no_planner = true; break;
     default: return false;
