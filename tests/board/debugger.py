@@ -1,8 +1,11 @@
 """As much of gdb's remote protocol as it takes to change an instruction of a running image."""
 
+import re
 import socket
 import subprocess
 from pathlib import Path
+
+PACKET = re.compile(rb"\$([^#]*)#..", re.DOTALL)
 
 
 class Debugger:
@@ -10,6 +13,7 @@ class Debugger:
 
     def __init__(self, port: int):
         self._socket = socket.create_connection(("127.0.0.1", port), 10.0)
+        self._buffer = b""
 
     def __enter__(self) -> "Debugger":
         return self
@@ -20,13 +24,18 @@ class Debugger:
 
     def _ask(self, command: str) -> str:
         self._socket.sendall(f"${command}#{sum(command.encode()) % 256:02x}".encode())
-        answer = b""
-        while b"#" not in answer[:-2]:
+        while (answer := self._read_packet()).startswith("T"):
+            pass  # it tells by itself that the board stands still
+        return answer
+
+    def _read_packet(self) -> str:
+        while (match := PACKET.search(self._buffer)) is None:
             data = self._socket.recv(4096)
             assert data, "the emulator's stub is gone"
-            answer += data
+            self._buffer += data
+        self._buffer = self._buffer[match.end():]
         self._socket.sendall(b"+")
-        return answer.partition(b"$")[2].rpartition(b"#")[0].decode()
+        return match[1].decode()
 
     def write(self, address: int, data: bytes) -> None:
         """Anywhere, code too. A reset loads the image's code again."""
