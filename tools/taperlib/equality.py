@@ -82,18 +82,18 @@ def _part_of_day(sessions: list[Session], day: int, begin_h: float, end_h: float
 
 
 def hub_hours(week: list[Session]) -> Case:
-    """Monday from 5 to 11 h: minimum currents, a limit that drops and comes back, a price, plans in slices."""
-    at = DAY_S
-    return Case("hub, 6 h of a real day", "hub", _part_of_day(week, 1, 5, 11, 3),
+    """Monday from 5 to 9 h: minimum currents, a limit that drops and comes back, a price, plans in slices."""
+    drop_s = DAY_S + 7 * HOUR_S
+    return Case("hub, 4 h of a real day", "hub", _part_of_day(week, 1, 5, 9, 2),
                 ("--policy", "soc-mpc", "--tick-s", "300", "--min-current-a", "6", "--iterations", "150",
                  "--limit-csv", "limits.csv", "--price-csv", "prices.csv", "--price-weight", "0.5"),
-                {"limits.csv": f"time_s,limit_kw\n0,40\n{at + 8 * HOUR_S},12\n{at + 9 * HOUR_S},30\n",
-                 "prices.csv": f"time_s,price_per_kwh\n0,0.3\n{at + 9 * HOUR_S + 1800},0.1\n{at + 10 * HOUR_S},0.5\n"})
+                {"limits.csv": f"time_s,limit_kw\n0,40\n{drop_s},12\n{drop_s + HOUR_S},30\n",
+                 "prices.csv": f"time_s,price_per_kwh\n0,0.3\n{drop_s + HOUR_S // 2},0.1\n{drop_s + HOUR_S},0.5\n"})
 
 
 def hub_seconds(week: list[Session]) -> Case:
-    """Ticks of a second, as a station has them: two minutes from when the fourth has come."""
-    some = _part_of_day(week, 1, 5, 11, 3)[:4]
+    """Ticks of a second, as a station has them: two minutes in which four come."""
+    some = _part_of_day(week, 1, 5, 9, 2)[:4]
     begin_s = max(one.arrival_s for one in some)
     return Case("hub, 2 min in ticks of 1 s", "hub",
                 [replace(one, arrival_s=begin_s + 20 * k, departure_s=begin_s + 120, expected_departure_s=one.departure_s)
