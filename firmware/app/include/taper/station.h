@@ -27,6 +27,7 @@
 #include "taper/port.h"
 #include "taper/rows.h"
 #include "taper/session.h"
+#include "taper/settings.h"
 #include "taper/shape.h"
 #include "taper/supervisor.h"
 #include "taper/transfers.h"
@@ -57,6 +58,7 @@ typedef struct {
         while periods and timeouts of the bus stay as they are. `tick_ms` of the configuration counts in their time.
         0 is 1, a real station. At most TAPER_MAX_TIME_SCALE, and `tick_ms`. */
     uint16_t time_scale;
+    taper_stored_t settings_found; /**< by taper_settings_load(), for the event log; 0 if there are none */
 } taper_station_options_t;
 
 #define TAPER_MAX_TIME_SCALE 1000
