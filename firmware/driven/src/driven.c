@@ -36,6 +36,12 @@ static uint32_t kicks(const taper_driven_t *driven) {
     return driven->board.kicks != NULL ? driven->board.kicks(driven->board.context) : 0;
 }
 
+static void watch(const taper_driven_t *driven, bool is_in_call) {
+    if (driven->board.watch != NULL) {
+        driven->board.watch(driven->board.context, is_in_call);
+    }
+}
+
 static void propose_edf(void *context, const taper_snapshot_t *snapshot, int32_t site_limit_W,
                         taper_proposal_t *proposal) {
     (void)site_limit_W;
@@ -90,6 +96,9 @@ static bool set_up(taper_driven_t *driven) {
         driven->is_ready = false;
         return false;
     }
+    if (driven->board.set_up != NULL) {
+        driven->board.set_up(driven->board.context);
+    }
     describe(driven);
     options.config = &driven->config;
     options.iterations_per_tick = driven->setup.iterations_per_tick;
@@ -138,6 +147,7 @@ static bool step(taper_driven_t *driven, uint32_t now_ms) {
 static void call(taper_driven_t *driven, uint8_t kind, uint32_t now_ms) {
     taper_drive_done_t done = {.ok = driven->is_ready};
     const uint32_t kicks_before = kicks(driven);
+    watch(driven, true);
     const uint32_t before = instructions(driven);
     if (driven->is_ready && kind == TAPER_DRIVE_STEP) {
         done.planned = step(driven, now_ms);
@@ -147,6 +157,7 @@ static void call(taper_driven_t *driven, uint8_t kind, uint32_t now_ms) {
         taper_station_stop(driven->station, now_ms);
     }
     done.instructions = instructions(driven) - before;
+    watch(driven, false);
     done.watchdog_kicked = kicks(driven) != kicks_before;
     finish(driven, (taper_drive_kind_t)kind, &done);
 }

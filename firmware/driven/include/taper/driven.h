@@ -24,6 +24,11 @@ typedef struct {
     uint32_t (*figure)(void *context, taper_drive_figure_t figure);
     /** Instructions executed, free-running. */
     uint32_t (*instructions)(void *context);
+    /** A call of the station begins, or is over: between calls the clock waits for the simulation, and nobody is to be
+        watched. */
+    void (*watch)(void *context, bool is_in_call);
+    /** A simulation takes the clock by SETUP: a new station, which finds its store empty. */
+    void (*set_up)(void *context);
     /** How often the station kicked the watchdog, free-running. */
     uint32_t (*kicks)(void *context);
     /** Reset the board; it greets again (taper_driven_init()). Need not return. */
