@@ -207,7 +207,7 @@ static bool write_until_power_goes(void *context, unsigned area, unsigned copy, 
     if (power_B < length) {
         taper_membus_tear_next_write(&bus, power_B);
     }
-    power_B -= taper_min_i32((int32_t)power_B, (int32_t)length);
+    power_B -= power_B < length ? power_B : length;
     return whole.store_write(context, area, copy, data, length);
 }
 
