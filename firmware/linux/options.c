@@ -63,7 +63,7 @@ static const struct argp_option options[] = {
      0},
     {"no-planner", KEY_NO_PLANNER, NULL, 0, "Charge by earliest deadline first", 0},
     {"record", KEY_RECORD, "FILE", 0, "Record all frames in this file (see below)", 0},
-    {"store", KEY_STORE, "FILE", 0, "Keep what outlives a restart in FILE.0 and FILE.1 (default: nowhere)",
+    {"store", KEY_STORE, "FILE", 0, "Keep what outlives a restart in FILE.0, FILE.1 (default: nowhere)",
      0},
     {"log-level", KEY_LOG_LEVEL, "L", 0, "error, warning, info or debug (default: info)", 0},
     {0},

@@ -113,8 +113,8 @@ static void test_row_30_of_a_torn_record_the_older_copy_is_used(void) {
 
 static void test_row_30_with_both_copies_bad_the_factorys_failsafe_limit_holds(void) {
     set_failsafe(7000);
-    taper_membus_rot(&live.bus, 0, 40);
-    taper_membus_rot(&live.bus, 1, 3);
+    taper_membus_rot(&live.bus, TAPER_STORE_STATION, 0, 40);
+    taper_membus_rot(&live.bus, TAPER_STORE_STATION, 1, 3);
     live_bench_revive_station();
     live_bench_run_ms(LIVE_POLL_ms);
     TEST_ASSERT_EQUAL_INT32(11000, live.station.limits.failsafe_W);
@@ -133,7 +133,7 @@ static void test_row_30_every_single_bit_that_rots_is_found(void) {
     live_bench_run_ms(LIVE_POLL_ms);
     for (uint32_t bit = 0; bit < 8 * sizeof(taper_station_record_t); bit++) {
         const unsigned newest = 1u - live.station.record_copy;
-        taper_membus_rot(&live.bus, newest, bit);
+        taper_membus_rot(&live.bus, TAPER_STORE_STATION, newest, bit);
         live_bench_revive_station();
         live_bench_run_ms(LIVE_POLL_ms);
         TEST_ASSERT_EQUAL_UINT(1, fault_events(TAPER_EVENT_STORE_OLD_COPY));

@@ -13,7 +13,7 @@ _Static_assert(sizeof(taper_station_record_t) == 16, "a record without padding")
 
 static bool read_copy(const taper_port_t *port, unsigned copy, taper_station_record_t *record,
                       bool *present) {
-    if (!port->store_read(port->context, copy, record, sizeof *record)) {
+    if (!port->store_read(port->context, TAPER_STORE_STATION, copy, record, sizeof *record)) {
         return false;
     }
     *present = true;
@@ -49,7 +49,7 @@ static void write_record(taper_station_t *station) {
     record.sequence++;
     record.failsafe_W = failsafe_told_W(station);
     record.crc32 = taper_crc32((const uint8_t *)&record, COVERED);
-    if (port->store_write(port->context, station->record_copy, &record, sizeof record)) {
+    if (port->store_write(port->context, TAPER_STORE_STATION, station->record_copy, &record, sizeof record)) {
         station->record = record;
         station->record_copy = (uint8_t)((station->record_copy + 1u) % TAPER_STORE_COPIES);
     }

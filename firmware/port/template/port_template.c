@@ -80,22 +80,26 @@ static uint32_t receive_overflows(void *context) {
 }
 
 /*
- * Copy `copy` (0 or 1) of the station's record in non-volatile memory, `length` bytes as they are: two flash sectors, or
- * two areas of an EEPROM or FRAM. The record has its own sequence number and CRC-32, so a write that power-off cuts short
- * may leave that copy torn; it must not harm the other. The station writes seldom, at most every ten seconds.
+ * Copy `copy` (0 or 1) of the record of an area (taper_store_area_t) in non-volatile memory, `length` bytes as they are, at
+ * most TAPER_STORE_RECORD_MAX: four flash sectors, or four ranges of an EEPROM or FRAM. A record has its own length,
+ * sequence number and CRC-32, so a write that power-off cuts short may leave that copy torn; it must not harm another.
+ * The station writes its own area at most every ten seconds, and every 15 minutes while vehicles charge; settings are
+ * written by hand. Flash that bears few erasures is erased only when a sector is full: append, and read the last one.
  */
-static bool store_read(void *context, unsigned copy, void *data, uint32_t length) {
+static bool store_read(void *context, unsigned area, unsigned copy, void *data, uint32_t length) {
     taper_template_board_t *board = context;
     (void)board;
+    (void)area;
     (void)copy;
     (void)data;
     (void)length;
     return false; /* never written */
 }
 
-static bool store_write(void *context, unsigned copy, const void *data, uint32_t length) {
+static bool store_write(void *context, unsigned area, unsigned copy, const void *data, uint32_t length) {
     taper_template_board_t *board = context;
     (void)board;
+    (void)area;
     (void)copy;
     (void)data;
     (void)length;

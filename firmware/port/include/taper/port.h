@@ -9,9 +9,20 @@
 #include <stdint.h>
 
 #include "taper/frame.h"
+#include "taper/sizes.h"
 
-/** Copies of a record that the non-volatile store holds. */
+/** What the non-volatile store holds: a record for each area, so that one that is written often never harms another. */
+typedef enum {
+    TAPER_STORE_STATION = 0,  /**< what changes while it runs: sessions, the failsafe limit told, starts */
+    TAPER_STORE_SETTINGS = 1, /**< what was set at the site (settings.h); written when somebody sets it */
+    TAPER_STORE_AREAS
+} taper_store_area_t;
+
+/** Copies of each record: a write harms one of them at most. */
 #define TAPER_STORE_COPIES 2u
+
+/** The longest record [bytes]: of the area TAPER_STORE_STATION of an image for its largest station. */
+#define TAPER_STORE_RECORD_MAX (64u + 96u * TAPER_MAX_CONNECTORS)
 
 typedef struct {
     void *context;
@@ -42,12 +53,13 @@ typedef struct {
     uint32_t (*receive_overflows)(void *context);
 
     /**
-     * Read or write a whole copy (0..TAPER_STORE_COPIES-1) of the station's record in non-volatile memory. A write that
-     * power-off cuts short may leave that copy torn, and no other. @return false: it could not be done, or was never
-     * written. Both NULL: no store.
+     * Read the first `length` bytes of a copy (0..TAPER_STORE_COPIES-1) of an area's record (taper_store_area_t) in
+     * non-volatile memory, or write it, from its first byte on; 1..TAPER_STORE_RECORD_MAX. A read may be longer or shorter
+     * than what was written: what lies beyond is of no account. A write that power-off cuts short may leave that copy
+     * torn, and no other of any area. @return false: it could not be done, or was never written. Both NULL: no store.
      */
-    bool (*store_read)(void *context, unsigned copy, void *data, uint32_t length);
-    bool (*store_write)(void *context, unsigned copy, const void *data, uint32_t length);
+    bool (*store_read)(void *context, unsigned area, unsigned copy, void *data, uint32_t length);
+    bool (*store_write)(void *context, unsigned area, unsigned copy, const void *data, uint32_t length);
 } taper_port_t;
 
 #endif

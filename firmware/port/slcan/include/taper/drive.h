@@ -55,6 +55,7 @@ typedef enum {
     TAPER_DRIVE_STORE_WRITES,     /**< since the start of the image */
     TAPER_DRIVE_BUILT_FOR,        /**< connectors of the board's station */
     TAPER_DRIVE_NAME,             /**< CRC-32 of the name of the board's station */
+    TAPER_DRIVE_PLANS,            /**< 1: the board has a planner */
     TAPER_DRIVE_FIGURES
 } taper_drive_figure_t;
 
@@ -79,6 +80,7 @@ typedef struct {
     bool hands_over;       /**< taper_station_hands_over() */
     bool is_settled;       /**< taper_station_is_settled() */
     bool watchdog_kicked;  /**< in this call */
+    bool planned;          /**< the planner stated a problem or worked on one in this call */
     uint8_t mode;          /**< taper_mode_t */
     uint16_t plans;        /**< TAPER_COUNTER_PLANS, its low 16 bits */
     uint32_t instructions; /**< of the call, to about 40, without frames going over the wire; 0: not known */

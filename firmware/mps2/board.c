@@ -1,0 +1,83 @@
+#include "board.h"
+
+#include "boot.h"
+#include "clock.h"
+#include "drive_hooks.h"
+#include "solver.h"
+#include "store.h"
+#include "taper/stations.h"
+#include "uart.h"
+#include "watchdog.h"
+
+/** One slice in a tick is the least there is: the planner has 15 minutes, the tick a few milliseconds. */
+#define ITERATIONS TAPER_MIN_SLICE
+
+static bool receive(void *context, taper_frame_t *frame) {
+    const taper_port_t *can = &((mps2_board_t *)context)->can;
+    return can->receive(can->context, frame);
+}
+
+/** Without somebody who listens a frame is lost, as on a bus; the station must not take that for a fault of its bus. */
+static bool send(void *context, const taper_frame_t *frame) {
+    const mps2_board_t *board = context;
+    return !board->slcan.is_open || board->can.send(board->can.context, frame);
+}
+
+static uint32_t receive_overflows(void *context) {
+    const taper_port_t *can = &((mps2_board_t *)context)->can;
+    return can->receive_overflows(can->context);
+}
+
+static void kick_watchdog(void *context) {
+    ((mps2_board_t *)context)->kicks++;
+    mps2_watchdog_kick();
+}
+
+static uint32_t clock_us(void *context) {
+    (void)context;
+    return mps2_clock_us();
+}
+
+static void open_channel(mps2_board_t *board) {
+    const taper_stream_t stream = mps2_uart_stream();
+    taper_slcan_init(&board->slcan, &stream);
+    if (mps2_boot()->channel_is_open) {
+        taper_slcan_open(&board->slcan);
+    }
+    board->can = taper_slcan_port(&board->slcan);
+    board->port = (taper_port_t){.context = board,
+                                 .receive = receive,
+                                 .send = send,
+                                 .kick_watchdog = kick_watchdog,
+                                 .clock_us = clock_us,
+                                 .receive_overflows = receive_overflows,
+                                 .store_read = mps2_store_read,
+                                 .store_write = mps2_store_write};
+}
+
+void mps2_board_start(mps2_board_t *board) {
+    open_channel(board);
+    board->options = (taper_station_options_t){.config = taper_stations[0],
+                                               .port = &board->port,
+                                               .solver = mps2_solver(),
+                                               .iterations_per_tick = ITERATIONS};
+    const taper_driven_board_t hooks = mps2_drive_hooks(&board->kicks);
+    taper_driven_init(&board->driven, &board->slcan, &board->station, &board->options, &hooks);
+}
+
+/** The simulation takes the clock. */
+static void let_go(void) {
+    mps2_watchdog_stop();
+    mps2_clock_stop();
+    mps2_boot()->is_driven = true;
+}
+
+bool mps2_board_serve(mps2_board_t *board) {
+    const bool was_driven = mps2_boot()->is_driven;
+    const bool is_driven = taper_driven_serve(&board->driven, mps2_clock_ms());
+    mps2_boot()->channel_is_open = board->slcan.is_open && !board->slcan.listens_only;
+    if (is_driven && !was_driven) {
+        let_go();
+    }
+    return is_driven || was_driven;
+}

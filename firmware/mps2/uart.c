@@ -1,0 +1,74 @@
+#include "uart.h"
+
+#include "core.h"
+#include "registers.h"
+
+/** Close to 921,600 baud. The divider is at least 16. */
+#define BAUD_DIVIDER 27u
+/** A power of two. */
+#define RING 256u
+
+_Static_assert(BAUD_DIVIDER >= 16, "CMSDK UART: the least divider");
+_Static_assert((RING & (RING - 1)) == 0, "free-running indices");
+
+static uint8_t ring[RING];
+static volatile uint32_t head, tail; // free-running: put at head, taken at tail
+
+void mps2_uart_interrupt(void);
+
+void mps2_uart_start(void) {
+    MPS2_UART0->baud_divider = BAUD_DIVIDER;
+    MPS2_UART0->control = MPS2_UART_TX_ON | MPS2_UART_RX_ON | MPS2_UART_RX_IRQ;
+    MPS2_NVIC_ENABLE = 1u << MPS2_IRQ_UART0_RX | 1u << MPS2_IRQ_UART0_TX;
+}
+
+/** Into the ring, if there is a byte and room for it. */
+static void take_byte(void) {
+    if ((MPS2_UART0->state & MPS2_UART_RX_FULL) != 0 && head - tail < RING) {
+        ring[head % RING] = (uint8_t)MPS2_UART0->data;
+        head++;
+    }
+}
+
+/** That the UART can send again is only told to end a wait. */
+void mps2_uart_interrupt(void) {
+    MPS2_UART0->interrupts = MPS2_UART_RX_EVENT | MPS2_UART_TX_EVENT;
+    MPS2_UART0->control &= ~MPS2_UART_TX_IRQ;
+    take_byte();
+}
+
+bool mps2_uart_has_received(void) {
+    return head != tail;
+}
+
+static size_t receive(void *context, uint8_t *data, size_t size) {
+    (void)context;
+    size_t count = 0;
+    while (count < size && head != tail) {
+        data[count++] = ring[tail % RING];
+        tail++;
+    }
+    // A byte that found the ring full waits in the UART, without another interrupt.
+    const uint32_t state = mps2_interrupts_off();
+    take_byte();
+    mps2_interrupts_restore(state);
+    return count;
+}
+
+static size_t transmit(void *context, const uint8_t *data, size_t size) {
+    (void)context;
+    size_t count = 0;
+    while (count < size && (MPS2_UART0->state & MPS2_UART_TX_FULL) == 0) {
+        MPS2_UART0->data = data[count++];
+    }
+    if (count < size) {
+        const uint32_t state = mps2_interrupts_off();
+        MPS2_UART0->control |= MPS2_UART_TX_IRQ;
+        mps2_interrupts_restore(state);
+    }
+    return count;
+}
+
+taper_stream_t mps2_uart_stream(void) {
+    return (taper_stream_t){.read = receive, .write = transmit};
+}
