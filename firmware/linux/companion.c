@@ -12,6 +12,7 @@
 
 #include "arguments.h"
 #include "taper/stations.h"
+#include "taper/version.h"
 #include "whole_file.h"
 
 #define US_PER_MS 1000

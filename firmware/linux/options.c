@@ -6,6 +6,7 @@
 
 #include "arguments.h"
 #include "taper/stations.h"
+#include "taper/version.h"
 
 #define LONGEST_NAME    15 // of a network interface
 #define UNKNOWN_STATION UINT32_MAX

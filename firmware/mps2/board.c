@@ -3,14 +3,12 @@
 #include "boot.h"
 #include "clock.h"
 #include "drive_hooks.h"
+#include "site.h"
 #include "solver.h"
 #include "store.h"
 #include "taper/stations.h"
 #include "uart.h"
 #include "watchdog.h"
-
-/** One slice in a tick is the least there is: the planner has 15 minutes, the tick a few milliseconds. */
-#define ITERATIONS TAPER_MIN_SLICE
 
 static bool receive(void *context, taper_frame_t *frame) {
     const taper_port_t *can = &((mps2_board_t *)context)->can;
@@ -57,27 +55,18 @@ static void open_channel(mps2_board_t *board) {
 
 void mps2_board_start(mps2_board_t *board) {
     open_channel(board);
-    board->options = (taper_station_options_t){.config = taper_stations[0],
-                                               .port = &board->port,
-                                               .solver = mps2_solver(),
-                                               .iterations_per_tick = ITERATIONS};
-    const taper_driven_board_t hooks = mps2_drive_hooks(&board->kicks);
-    taper_driven_init(&board->driven, &board->slcan, &board->station, &board->options, &hooks);
-}
-
-/** The simulation takes the clock. */
-static void let_go(void) {
-    mps2_watchdog_stop();
-    mps2_clock_stop();
-    mps2_boot()->is_driven = true;
+    board->options = mps2_site_options(&board->port, &board->site);
+    taper_station_options_t driven_options = board->options;
+    driven_options.config = taper_stations[0];
+    driven_options.solver = mps2_solver();
+    driven_options.policy = NULL;
+    const taper_driven_board_t hooks = mps2_drive_hooks(board);
+    taper_driven_init(&board->driven, &board->slcan, &board->station, &driven_options, &hooks,
+                      mps2_boot()->is_driven);
 }
 
 bool mps2_board_serve(mps2_board_t *board) {
-    const bool was_driven = mps2_boot()->is_driven;
     const bool is_driven = taper_driven_serve(&board->driven, mps2_clock_ms());
     mps2_boot()->channel_is_open = board->slcan.is_open && !board->slcan.listens_only;
-    if (is_driven && !was_driven) {
-        let_go();
-    }
-    return is_driven || was_driven;
+    return is_driven;
 }

@@ -3,6 +3,7 @@
 #define MPS2_BOARD_H
 
 #include "taper/driven.h"
+#include "taper/settings.h"
 #include "taper/slcan.h"
 #include "taper/station.h"
 
@@ -10,13 +11,15 @@ typedef struct {
     taper_slcan_t slcan;
     taper_port_t can;  /**< of `slcan` */
     taper_port_t port; /**< of the station: `can`, and the board's clock, watchdog and store */
+    taper_site_t site;
     taper_station_options_t options;
     taper_station_t station;
     taper_driven_t driven;
-    uint32_t kicks; /**< of the watchdog */
+    uint32_t kicks;      /**< of the watchdog */
+    uint32_t call_began; /**< mps2_clock_cycles(), of a call by the simulation */
 } mps2_board_t;
 
-/** All but taper_station_init(). A channel that was open before a reset is open. */
+/** All but taper_station_init(), with the settings of the store. A channel that was open before a reset is open. */
 void mps2_board_start(mps2_board_t *board);
 
 /**

@@ -1,8 +1,10 @@
 #include "drive_hooks.h"
 
+#include "boot.h"
 #include "clock.h"
 #include "emulator.h"
 #include "fault.h"
+#include "site.h"
 #include "stack.h"
 #include "store.h"
 #include "watchdog.h"
@@ -20,27 +22,42 @@ static uint32_t figure(void *context, taper_drive_figure_t figure) {
     }
 }
 
-static uint32_t instructions(void *context) {
-    (void)context;
-    return mps2_clock_cycles() * MPS2_INSTRUCTIONS_PER_CYCLE;
+/** From now on, over resets, the board's own clock stands still. */
+static void let_go(void) {
+    mps2_watchdog_stop();
+    mps2_clock_stop();
+    mps2_boot()->is_driven = true;
 }
 
-static void watch(void *context, bool is_in_call) {
-    (void)context;
-    if (is_in_call) {
-        mps2_watchdog_start(LONGEST_CALL_ms);
-    } else {
-        mps2_watchdog_stop();
-    }
-}
-
-static void forget(void *context) {
-    (void)context;
+static void set_up(void *context, const taper_drive_setup_t *setup) {
+    const mps2_board_t *board = context;
+    let_go();
     mps2_store_erase();
+    (void)mps2_site_keep(&board->port, setup);
+}
+
+static bool resume(void *context, taper_drive_setup_t *setup) {
+    const mps2_board_t *board = context;
+    let_go();
+    return mps2_site_kept(&board->port, setup);
+}
+
+static void begin_call(void *context) {
+    mps2_board_t *board = context;
+    mps2_watchdog_start(LONGEST_CALL_ms);
+    board->call_began = mps2_clock_cycles();
+}
+
+/** Between calls the clock waits for the simulation, and nobody is to be watched. */
+static uint32_t end_call(void *context) {
+    const mps2_board_t *board = context;
+    const uint32_t cycles = mps2_clock_cycles() - board->call_began;
+    mps2_watchdog_stop();
+    return cycles * MPS2_INSTRUCTIONS_PER_CYCLE;
 }
 
 static uint32_t kicks(void *context) {
-    return *(const uint32_t *)context;
+    return ((const mps2_board_t *)context)->kicks;
 }
 
 static void reset(void *context) {
@@ -53,12 +70,13 @@ static void exit_emulator(void *context, uint8_t status) {
     mps2_emulator_exit(status);
 }
 
-taper_driven_board_t mps2_drive_hooks(uint32_t *kick_count) {
-    return (taper_driven_board_t){.context = kick_count,
+taper_driven_board_t mps2_drive_hooks(mps2_board_t *board) {
+    return (taper_driven_board_t){.context = board,
                                   .figure = figure,
-                                  .instructions = instructions,
-                                  .watch = watch,
-                                  .set_up = forget,
+                                  .set_up = set_up,
+                                  .resume = resume,
+                                  .call_begins = begin_call,
+                                  .call_ends = end_call,
                                   .kicks = kicks,
                                   .reset = reset,
                                   .exit = exit_emulator};

@@ -2,9 +2,9 @@
 #ifndef MPS2_DRIVE_HOOKS_H
 #define MPS2_DRIVE_HOOKS_H
 
-#include "taper/driven.h"
+#include "board.h"
 
-/** `kicks` counts those of the watchdog; it must outlive the hooks. */
-taper_driven_board_t mps2_drive_hooks(uint32_t *kicks);
+/** `board` must outlive the hooks. */
+taper_driven_board_t mps2_drive_hooks(mps2_board_t *board);
 
 #endif

@@ -17,6 +17,9 @@ typedef struct {
     const char *price_file;    /**< NULL: none */
     const char *out;           /**< NULL: no files */
     const char *problems_file; /**< NULL: none */
+    const char *frames_file;   /**< NULL: none */
+    const char *bus;           /**< HOST:PORT of the board; NULL: the station is part of the program */
+    unsigned bus_timeout_s;    /**< 0: not given */
     const sim_policy_t *policy;
     unsigned station;     /**< index in taper_stations[] */
     double limit_kw;      /**< negative: not given */

@@ -6,12 +6,14 @@
 #include "taper/fallback.h"
 
 void taper_driven_init(taper_driven_t *driven, taper_slcan_t *slcan, taper_station_t *station,
-                       const taper_station_options_t *options, const taper_driven_board_t *board) {
+                       const taper_station_options_t *options, const taper_driven_board_t *board,
+                       bool is_driven) {
     memset(driven, 0, sizeof *driven);
     driven->slcan = slcan;
     driven->station = station;
     driven->options = *options;
     driven->board = *board;
+    driven->is_driven = is_driven;
 }
 
 static void send(taper_driven_t *driven, taper_slcan_message_t message) {
@@ -26,20 +28,6 @@ static void greet_newcomer(taper_driven_t *driven) {
     }
     driven->was_open = slcan->is_open;
     driven->opens = slcan->opens;
-}
-
-static uint32_t instructions(const taper_driven_t *driven) {
-    return driven->board.instructions != NULL ? driven->board.instructions(driven->board.context) : 0;
-}
-
-static uint32_t kicks(const taper_driven_t *driven) {
-    return driven->board.kicks != NULL ? driven->board.kicks(driven->board.context) : 0;
-}
-
-static void watch(const taper_driven_t *driven, bool is_in_call) {
-    if (driven->board.watch != NULL) {
-        driven->board.watch(driven->board.context, is_in_call);
-    }
 }
 
 static void propose_edf(void *context, const taper_snapshot_t *snapshot, int32_t site_limit_W,
@@ -79,26 +67,18 @@ static void drop_frames(const taper_driven_t *driven) {
     }
 }
 
-/** @return whether the station took these options. */
-static bool begin(taper_driven_t *driven, const taper_station_options_t *options) {
-    drop_frames(driven);
-    driven->is_driven = true;
-    driven->now_ms = 0;
-    driven->slice_iterations = 0;
-    driven->is_ready = taper_station_init(driven->station, options) == TAPER_OK;
-    return driven->is_ready;
-}
-
-static bool set_up(taper_driven_t *driven) {
+/** A new station by `driven->setup`. @return whether it took the settings. */
+static bool make_station(taper_driven_t *driven) {
     taper_station_options_t options = driven->options;
     const uint8_t policy = driven->setup.policy;
-    if (policy > TAPER_DRIVE_LLF || options.config->connector_count > TAPER_MAX_CONNECTORS) {
-        driven->is_ready = false;
+    driven->is_driven = true;
+    driven->is_ready = false;
+    driven->now_ms = 0;
+    driven->slice_iterations = 0;
+    if (policy > TAPER_DRIVE_LLF) {
         return false;
     }
-    if (driven->board.set_up != NULL) {
-        driven->board.set_up(driven->board.context);
-    }
+    drop_frames(driven);
     describe(driven);
     options.config = &driven->config;
     options.iterations_per_tick = driven->setup.iterations_per_tick;
@@ -108,7 +88,8 @@ static bool set_up(taper_driven_t *driven) {
         options.policy = &driven->policy;
         options.solver = NULL;
     }
-    return begin(driven, &options);
+    driven->is_ready = taper_station_init(driven->station, &options) == TAPER_OK;
+    return driven->is_ready;
 }
 
 static void finish(taper_driven_t *driven, taper_drive_kind_t kind, taper_drive_done_t *done) {
@@ -122,14 +103,26 @@ static void finish(taper_driven_t *driven, taper_drive_kind_t kind, taper_drive_
     send(driven, taper_drive_done(kind, done));
 }
 
+/** The second part makes the station; both are there then. */
 static void take_setup(taper_driven_t *driven, const taper_slcan_message_t *message, uint8_t part) {
+    const taper_driven_board_t *board = &driven->board;
     taper_drive_done_t done = {.ok = false};
-    const bool good = part <= 1 && taper_drive_get_setup(message, &driven->setup);
-    if (good && part == 0) {
+    const bool is_good = part <= 1 && taper_drive_get_setup(message, &driven->setup);
+    if (is_good && part == 0) {
         return;
     }
-    done.ok = good && set_up(driven);
+    if (board->set_up != NULL) {
+        board->set_up(board->context, &driven->setup);
+    }
+    done.ok = is_good && make_station(driven);
     finish(driven, TAPER_DRIVE_SETUP, &done);
+}
+
+static void resume(taper_driven_t *driven) {
+    const taper_driven_board_t *board = &driven->board;
+    taper_drive_done_t done = {.ok = false};
+    done.ok = board->resume != NULL && board->resume(board->context, &driven->setup) && make_station(driven);
+    finish(driven, TAPER_DRIVE_RESUME, &done);
 }
 
 /** A step, and how much of it was the planner's. */
@@ -144,21 +137,31 @@ static bool step(taper_driven_t *driven, uint32_t now_ms) {
     return is_new || planner->slices != slices;
 }
 
+static uint32_t kicks(const taper_driven_board_t *board) {
+    return board->kicks != NULL ? board->kicks(board->context) : 0;
+}
+
+static void call_station(taper_driven_t *driven, uint8_t kind, uint32_t now_ms, taper_drive_done_t *done) {
+    const taper_driven_board_t *board = &driven->board;
+    const uint32_t kicks_before = kicks(board);
+    if (board->call_begins != NULL) {
+        board->call_begins(board->context);
+    }
+    switch (kind) {
+    case TAPER_DRIVE_STEP: done->planned = step(driven, now_ms); break;
+    case TAPER_DRIVE_POLL: taper_station_poll(driven->station, now_ms); break;
+    default: taper_station_stop(driven->station, now_ms); break;
+    }
+    done->instructions = board->call_ends != NULL ? board->call_ends(board->context) : 0;
+    done->watchdog_kicked = kicks(board) != kicks_before;
+}
+
+/** A station that did not take its settings is not called. */
 static void call(taper_driven_t *driven, uint8_t kind, uint32_t now_ms) {
     taper_drive_done_t done = {.ok = driven->is_ready};
-    const uint32_t kicks_before = kicks(driven);
-    watch(driven, true);
-    const uint32_t before = instructions(driven);
-    if (driven->is_ready && kind == TAPER_DRIVE_STEP) {
-        done.planned = step(driven, now_ms);
-    } else if (driven->is_ready && kind == TAPER_DRIVE_POLL) {
-        taper_station_poll(driven->station, now_ms);
-    } else if (driven->is_ready) {
-        taper_station_stop(driven->station, now_ms);
+    if (driven->is_ready) {
+        call_station(driven, kind, now_ms, &done);
     }
-    done.instructions = instructions(driven) - before;
-    watch(driven, false);
-    done.watchdog_kicked = kicks(driven) != kicks_before;
     finish(driven, (taper_drive_kind_t)kind, &done);
 }
 
@@ -181,7 +184,7 @@ static uint32_t figure(const taper_driven_t *driven, uint8_t index) {
     case TAPER_DRIVE_SLICE_ITERATIONS: return driven->slice_iterations;
     case TAPER_DRIVE_BUILT_FOR: return driven->options.config->connector_count;
     case TAPER_DRIVE_NAME: return name_crc(driven->options.config->name);
-    case TAPER_DRIVE_PLANS: return driven->options.solver != NULL;
+    case TAPER_DRIVE_HAS_PLANNER: return driven->options.solver != NULL;
     default: return board->figure != NULL ? board->figure(board->context, (taper_drive_figure_t)index) : 0;
     }
 }
@@ -194,11 +197,6 @@ static void tell(taper_driven_t *driven, uint8_t kind, uint8_t index) {
         value = taper_station_counter(driven->station, (taper_counter_t)index);
     }
     send(driven, taper_drive_u32(TAPER_DRIVE_VALUE, index, value));
-}
-
-static void resume(taper_driven_t *driven) {
-    taper_drive_done_t done = {.ok = begin(driven, &driven->options)};
-    finish(driven, TAPER_DRIVE_RESUME, &done);
 }
 
 static void leave(taper_driven_t *driven, uint8_t kind, uint8_t status) {

@@ -3,7 +3,7 @@
  * main loop, and tests on the host; a product has none of this.
  *
  *     static taper_driven_t driven;
- *     taper_driven_init(&driven, &slcan, &station, &options, &board);
+ *     taper_driven_init(&driven, &slcan, &station, &options, &board, false);
  *     for (;;) {
  *         if (!taper_driven_serve(&driven, now_ms())) {
  *             ... nobody drives: step and poll the station by the board's own clock
@@ -17,21 +17,21 @@
 #include "taper/slcan.h"
 #include "taper/station.h"
 
-/** What only the board knows. Each function may be NULL: then the answer is 0, or nothing happens. */
+/** What only the board can do. Each function may be NULL: then nothing happens, and the answer is 0 or false. */
 typedef struct {
     void *context;
     /** Figures of the stack and the store. */
     uint32_t (*figure)(void *context, taper_drive_figure_t figure);
-    /** Instructions executed, free-running. */
-    uint32_t (*instructions)(void *context);
-    /** A call of the station begins, or is over: between calls the clock waits for the simulation, and nobody is to be
-        watched. */
-    void (*watch)(void *context, bool is_in_call);
-    /** A simulation takes the clock by SETUP: a new station, which finds its store empty. */
-    void (*set_up)(void *context);
+    /** A simulation takes the clock for a new station: empty the store, and keep the settings over a reset. */
+    void (*set_up)(void *context, const taper_drive_setup_t *setup);
+    /** It takes the clock again after a reset. @return false: no settings were kept. */
+    bool (*resume)(void *context, taper_drive_setup_t *setup);
+    /** Around every step, poll and stop: a watchdog, a count of instructions. @return instructions since the beginning. */
+    void (*call_begins)(void *context);
+    uint32_t (*call_ends)(void *context);
     /** How often the station kicked the watchdog, free-running. */
     uint32_t (*kicks)(void *context);
-    /** Reset the board; it greets again (taper_driven_init()). Need not return. */
+    /** Reset the board, which then greets whoever is attached: taper_driven_serve(). Need not return. */
     void (*reset)(void *context);
     /** End the emulator. Need not return. */
     void (*exit)(void *context, uint8_t status);
@@ -56,12 +56,13 @@ typedef struct {
 } taper_driven_t;
 
 /**
- * Nobody drives yet. `options` and `board` are copied; `slcan`, `station` and what the options point to must outlive
+ * Nobody drives yet, unless a simulation had the clock when the board was reset: `is_driven`. `options` and `board` are copied; `slcan`, `station` and what the options point to must outlive
  * `driven`. The port of the options sends and receives by `slcan`. A channel that is open already is greeted by the next
  * taper_driven_serve().
  */
 void taper_driven_init(taper_driven_t *driven, taper_slcan_t *slcan, taper_station_t *station,
-                       const taper_station_options_t *options, const taper_driven_board_t *board);
+                       const taper_station_options_t *options, const taper_driven_board_t *board,
+                       bool is_driven);
 
 /**
  * Move bytes, and do what was asked for: as much as has come. Until the first SETUP or RESUME, frames are received at
