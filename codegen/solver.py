@@ -138,10 +138,10 @@ def _solver_c(solver: Solver) -> str:
 #include "{name}_workspace.h"
 
 const taper_solver_t taper_solver_{name} = {{
-    .osqp = &{name}_solver,
-    .a_values = {name}_data_A_csc_x,
+    .osqp = &{workspace.symbol(name, "solver")},
+    .a_values = {workspace.symbol(name, "data_A_csc_x")},
     .a_count = {solver.length("data_A_csc_x")},
-    .p_values = {name}_data_P_csc_x,
+    .p_values = {workspace.symbol(name, "data_P_csc_x")},
     .p_count = {solver.length("data_P_csc_x")},
     .variables = {at.variables},
     .rows = {at.rows},

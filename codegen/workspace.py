@@ -84,6 +84,11 @@ class Struct:
     fields: tuple[str, ...]
 
 
+def symbol(station: str, name: str) -> str:
+    """The C identifier of a part of a station's workspace."""
+    return f"taper_workspace_{station}_{name}"
+
+
 def number(value: float, real: Real) -> str:
     """The shortest literal that reads back as exactly `value`, or as the float nearest to it."""
     return repr(float(value)) if real == "double" else f"{np.float32(value)!s}F"
@@ -168,18 +173,19 @@ def render_header(parts: list[Array | Struct], station: str) -> str:
     """NAME_workspace.h."""
     guard = f"{station.upper()}_WORKSPACE_H"
     lengths = {part.name: part.length for part in parts if isinstance(part, Array)}
-    arrays = "".join(f"extern OSQPFloat {station}_{name}[{lengths[name]}];\n" for name in SHARED)
+    solver = symbol(station, "solver")
+    arrays = "".join(f"extern OSQPFloat {symbol(station, name)}[{lengths[name]}];\n" for name in SHARED)
     return (
         f"/** Solver of station {station}. One instance, not re-entrant. Values of A and P: write, then update. */\n"
         f"#ifndef {guard}\n#define {guard}\n\n"
-        f'#include "osqp_api_types.h"\n\nextern OSQPSolver {station}_solver;\n{arrays}\n#endif\n'
+        f'#include "osqp_api_types.h"\n\nextern OSQPSolver {solver};\n{arrays}\n#endif\n'
     )
 
 
 def _render_array(array: Array, station: str, real: Real) -> str:
     storage = "" if array.name in SHARED else "static const " if array.is_const else "static "
     kind = "OSQPInt" if array.is_int else "OSQPFloat"
-    declared = f"{storage}{kind} {station}_{array.name}[{array.length}]"
+    declared = f"{storage}{kind} {symbol(station, array.name)}[{array.length}]"
     if array.values is None:
         return f"{declared};\n"
     texts = [str(value) if array.is_int else number(value, real) for value in array.values]
@@ -202,7 +208,7 @@ def _render_struct(struct: Struct, station: str, real: Real, names: dict[str, Ar
     if struct.type in _FORGOTTEN_FIELD:
         fields.append(_FORGOTTEN_FIELD[struct.type])
     body = "".join(f"{_INDENT}{field},\n" for field in fields)
-    return f"{storage}{struct.type} {station}_{struct.name} = {{\n{body}}};\n"
+    return f"{storage}{struct.type} {symbol(station, struct.name)} = {{\n{body}}};\n"
 
 
 def _render_field(field: str, station: str, real: Real, names: dict[str, Array | Struct]) -> str:
@@ -214,4 +220,4 @@ def _render_field(field: str, station: str, real: Real, names: dict[str, Array |
 
 
 def _prefixed(word: str, station: str, names: dict[str, Array | Struct]) -> str:
-    return f"{station}_{word}" if word in names else word
+    return symbol(station, word) if word in names else word

@@ -57,11 +57,12 @@ static void solve_and_print(OSQPSolver *solver, OSQPFloat *a, OSQPInt a_count, O
 }
 
 #define COUNT(array) ((OSQPInt)(sizeof(array) / sizeof((array)[0])))
+#define SOLVE_AND_PRINT(workspace)                                                                  \
+    solve_and_print(&workspace##_solver, workspace##_data_A_csc_x, COUNT(workspace##_data_A_csc_x), \
+                    workspace##_data_P_csc_x, COUNT(workspace##_data_P_csc_x))
 
 int main(void) {
-    solve_and_print(&hub_solver, hub_data_A_csc_x, COUNT(hub_data_A_csc_x), hub_data_P_csc_x,
-                    COUNT(hub_data_P_csc_x));
-    solve_and_print(&garage_solver, garage_data_A_csc_x, COUNT(garage_data_A_csc_x), garage_data_P_csc_x,
-                    COUNT(garage_data_P_csc_x));
+    SOLVE_AND_PRINT(taper_workspace_hub);
+    SOLVE_AND_PRINT(taper_workspace_garage);
     return 0;
 }
