@@ -130,11 +130,12 @@ static bool step(taper_driven_t *driven, uint32_t now_ms) {
     const taper_planner_t *planner = &driven->station->planner;
     const uint32_t started_ms = planner->started_ms;
     const uint16_t before = planner->iterations;
+    const bool works = planner->verdict == TAPER_VERDICT_SOLVING;
     const uint8_t slices = planner->slices;
     taper_station_step(driven->station, now_ms);
     const bool is_new = planner->started_ms != started_ms;
     driven->slice_iterations = (uint16_t)(planner->iterations - (is_new ? 0 : before));
-    return is_new || planner->slices != slices;
+    return works || is_new || planner->slices != slices;
 }
 
 static uint32_t kicks(const taper_driven_board_t *board) {
