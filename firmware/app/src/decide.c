@@ -27,6 +27,9 @@ static void note_draw(taper_station_t *station, uint8_t i, taper_draw_state_t be
     if (state == before) {
         return;
     }
+    if (state == TAPER_DRAW_LOCKED || before == TAPER_DRAW_LOCKED) {
+        station->sessions.changes++; /* a restart must not unlock it */
+    }
     if (state == TAPER_DRAW_OVER) {
         taper_station_count(station, TAPER_COUNTER_OVER_DRAWS);
         taper_event_note(&station->events, TAPER_EVENT_OVER_DRAW, connector->bus, connector->node,
@@ -44,7 +47,7 @@ static void watch_draw(taper_station_t *station, uint8_t i, uint32_t now_ms) {
     taper_draw_t *draw = &station->draw[i];
     const taper_draw_state_t before = draw->state;
     const taper_draw_report_t report = {
-        .plugged = station->sessions.session[i].vehicle_there,
+        .plugged = taper_session_may_be_there(&station->sessions, i),
         .session = taper_session_number(&station->sessions, i),
         .allowed_mA = taper_ledger_told_mA(&station->ledger, i),
         .setpoint_mA = taper_max_i32(station->sent_mA[i], 0),

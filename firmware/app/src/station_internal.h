@@ -136,7 +136,13 @@ void taper_alarm_update(taper_station_t *station, uint32_t now_ms);
 
 /* record.c: what survives a restart, rows 29 and 30 */
 
+/** Read it, await its sessions, and write it with one start more. The station's clock does not run yet. */
 void taper_record_load(taper_station_t *station);
-void taper_record_update(taper_station_t *station, uint32_t now_ms);
+
+/** The clock runs from `now_ms`. */
+void taper_record_start_clock(taper_station_t *station, uint32_t now_ms);
+
+/** A tick finds out whether it should be written; the next call, a poll if there is one, does that: a tick has enough to do. */
+void taper_record_update(taper_station_t *station, bool in_tick, uint32_t now_ms);
 
 #endif
