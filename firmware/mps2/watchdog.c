@@ -11,6 +11,7 @@ static void set(uint32_t control) {
 void mps2_watchdog_start(uint32_t ms) {
     MPS2_WATCHDOG->lock = MPS2_WATCHDOG_UNLOCK;
     MPS2_WATCHDOG->load = ms * (MPS2_CLOCK_Hz / 1000u);
+    MPS2_WATCHDOG->clear = 1; // it also ran while it was off, and an expiry then would count now
     set(MPS2_WATCHDOG_NMI | MPS2_WATCHDOG_RESET);
 }
 

@@ -224,7 +224,7 @@ taper_verdict_t taper_planner_run(taper_planner_t *planner, uint16_t iterations)
             break; /* a factorisation never shares a short slice */
         }
     }
-    planner->slices = (uint8_t)(planner->slices + (planner->slices < UINT8_MAX ? 1 : 0));
+    planner->slices++; /* a problem takes less than twice TAPER_MAX_ITERATIONS */
     if (taper_planner_is_usable(planner->verdict)) {
         taper_project(&planner->horizon, planner->solver->osqp->solution->x);
     }

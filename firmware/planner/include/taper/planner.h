@@ -52,7 +52,7 @@ typedef struct {
     taper_verdict_t verdict;
     taper_work_t next;
     uint16_t iterations;                   /**< spent on the present problem */
-    uint8_t slices;                        /**< of the present problem */
+    uint16_t slices;                       /**< of the present problem */
     uint32_t started_ms;                   /**< time of the snapshot that the problem is for */
     uint8_t session[TAPER_MAX_CONNECTORS]; /**< whose trajectory the warm start holds; 0: nobody's */
     bool matrix_is_current;                /**< the solver's factorisation is that of its matrices' values */
