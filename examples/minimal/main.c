@@ -37,7 +37,7 @@ int main(void) {
         .config = &taper_station_hub,
         .port = &port,
         .solver = &taper_solver_hub, /* NULL: no planner, earliest deadline first */
-        .iterations_per_tick = 50,
+        .iterations_per_tick = TAPER_MIN_SLICE,
     };
     if (taper_station_init(&station, &options) != TAPER_OK) {
         return 1; /* never step it: the description does not fit this image */

@@ -36,8 +36,21 @@ static uint32_t clock_us(void *context) {
     return mps2_clock_us();
 }
 
+static size_t read_uart(void *context, uint8_t *data, size_t size) {
+    const taper_stream_t *uart = &((mps2_board_t *)context)->uart;
+    return uart->read(uart->context, data, size);
+}
+
+/** Before the answer to "open" leaves, it is true over a reset. */
+static size_t write_uart(void *context, const uint8_t *data, size_t size) {
+    const mps2_board_t *board = context;
+    mps2_boot()->channel_is_open = board->slcan.is_open && !board->slcan.listens_only;
+    return board->uart.write(board->uart.context, data, size);
+}
+
 static void open_channel(mps2_board_t *board) {
-    const taper_stream_t stream = mps2_uart_stream();
+    const taper_stream_t stream = {.context = board, .read = read_uart, .write = write_uart};
+    board->uart = mps2_uart_stream();
     taper_slcan_init(&board->slcan, &stream);
     if (mps2_boot()->channel_is_open) {
         taper_slcan_open(&board->slcan);
@@ -66,7 +79,5 @@ void mps2_board_start(mps2_board_t *board) {
 }
 
 bool mps2_board_serve(mps2_board_t *board) {
-    const bool is_driven = taper_driven_serve(&board->driven, mps2_clock_ms());
-    mps2_boot()->channel_is_open = board->slcan.is_open && !board->slcan.listens_only;
-    return is_driven;
+    return taper_driven_serve(&board->driven, mps2_clock_ms());
 }

@@ -8,9 +8,10 @@
 #include "taper/station.h"
 
 typedef struct {
-    taper_slcan_t slcan;
-    taper_port_t can;  /**< of `slcan` */
-    taper_port_t port; /**< of the station: `can`, and the board's clock, watchdog and store */
+    taper_stream_t uart;
+    taper_slcan_t slcan; /**< over `uart` */
+    taper_port_t can;    /**< of `slcan` */
+    taper_port_t port;   /**< of the station: `can`, and the board's clock, watchdog and store */
     taper_site_t site;
     taper_station_options_t options;
     taper_station_t station;

@@ -138,10 +138,12 @@ static int load_and_run(const sim_options_t *options, const taper_station_config
         const sim_case_t run = {.station = station,
                                 .solver = taper_setup_solver(options->station),
                                 .policy = options->policy,
+                                .iterations = options->iterations > 0
+                                                  ? options->iterations
+                                                  : taper_setup_iterations(station->tick_ms),
                                 .sessions = &sessions,
                                 .limits = &limits,
                                 .prices = options->price_file == NULL ? NULL : &prices,
-                                .iterations = options->replay.setup.iterations,
                                 .seed = options->seed,
                                 .link = link,
                                 .problems = logs.problems,

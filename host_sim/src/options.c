@@ -97,9 +97,9 @@ static const struct argp_option options[] = {
      "Weight of the price against having energy early, 0..1 (default: the station's own)", 0},
     {"tick-s", KEY_TICK, "N", 0, "Control tick [s], 1..3600 (default: 60)", 0},
     {"iterations", KEY_ITERATIONS, "N", 0,
-     "Solver iterations in a control tick; fewer than 10 bound its work (default: a whole solve in ticks of "
-     "10 s and "
-     "more, otherwise 50; in a replay as recorded)",
+     "Solver iterations in a tick, 1..500; fewer than 10 bound its work (default: 500 in ticks of 10 s or "
+     "more, else 50); in a replay, as "
+     "taper-station was told",
      0},
     {"min-current-a", KEY_MINIMUM, "X", 0,
      "Least current per phase [A] of every connector; 0: any (default: the station's own)", 0},
@@ -115,7 +115,9 @@ static const struct argp_option options[] = {
     {"out", KEY_OUT, "DIR", 0,
      "Write the results to this directory, made if missing (default: only print a summary)", 0},
     {NULL, 0, NULL, 0,
-     "Replay of a recorded bus. If FILE.station does not tell them, with --station, --limit-kw and:", 1},
+     "Replay of a recorded bus. If FILE.station does not tell them, with --station, --limit-kw, --iterations "
+     "and:",
+     1},
     {"replay-log", KEY_REPLAY_LOG, "FILE", 0, "Recording of taper-station or of candump -l (see below)", 1},
     {"can", KEY_CAN, "IFACE", 0,
      "Interface in the recording; once for each bus, bus 0 first (default: as recorded, or in order of "
@@ -174,13 +176,13 @@ static const char *name_of(int key) {
     return option->name;
 }
 
-/** Both kinds of run know --station and --limit-kw. */
+/** Both kinds of run know these. */
 static bool is_of_both(int key) {
     return key == KEY_STATION || key == KEY_LIMIT || key == KEY_ITERATIONS;
 }
 
 static bool is_of_replay(int key) {
-    return key >= KEY_REPLAY_LOG && key <= KEY_NO_PLANNER;
+    return key >= KEY_REPLAY_LOG && key <= KEY_NO_PLANNER && !is_of_both(key);
 }
 
 /** Remember one option of either kind, to refuse what makes no sense together. */
@@ -245,6 +247,7 @@ static void check(sim_options_t *chosen, struct argp_state *state) {
     }
     chosen->replay.setup.station = chosen->station;
     chosen->replay.setup.limit_kw = chosen->limit_kw;
+    chosen->replay.setup.iterations = chosen->iterations;
     if (chosen->run_option != NULL) {
         argp_error(state, "--%s and --replay-log exclude each other", chosen->run_option);
     }
@@ -286,16 +289,13 @@ static bool parse_replay(int key, const char *text, sim_replay_options_t *replay
     case KEY_TIME_SCALE:
         setup->time_scale = whole("--time-scale", text, 1, TAPER_MAX_TIME_SCALE, state);
         break;
-    case KEY_ITERATIONS:
-        setup->iterations = whole("--iterations", text, 1, TAPER_MAX_ITERATIONS, state);
-        break;
     case KEY_NO_PLANNER: setup->no_planner = true; break;
     default: return false;
     }
     return true;
 }
 
-/** The options of what goes beside the results, and of --bus. @return whether `key` is one. */
+/** The options of --bus, of what goes beside the results, and --iterations. @return whether `key` is one. */
 static bool parse_bus(int key, const char *text, sim_options_t *chosen, struct argp_state *state) {
     switch (key) {
     case KEY_PROBLEMS: chosen->problems_file = text; break;
@@ -303,6 +303,9 @@ static bool parse_bus(int key, const char *text, sim_options_t *chosen, struct a
     case KEY_BUS: set_bus(chosen, text, state); break;
     case KEY_BUS_TIMEOUT:
         chosen->bus_timeout_s = whole("--bus-timeout-s", text, 1, LONGEST_TIMEOUT_S, state);
+        break;
+    case KEY_ITERATIONS:
+        chosen->iterations = whole("--iterations", text, 1, TAPER_MAX_ITERATIONS, state);
         break;
     default: return false;
     }

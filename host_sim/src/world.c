@@ -13,7 +13,6 @@
 #include "problems.h"
 #include "progress.h"
 #include "queue.h"
-#include "setup.h"
 
 /** Connectors echo their first setpoints this long after the tick began [ms]. */
 #define ECHO_ms TAPER_EVSE_STATUS_CYCLE_ms
@@ -69,8 +68,7 @@ static bool start_station(const world_t *world) {
         .config = run->station,
         .solver = run->solver,
         .policy = run->policy,
-        .iterations_per_tick =
-            run->iterations > 0 ? run->iterations : taper_setup_iterations(run->station->tick_ms),
+        .iterations_per_tick = run->iterations,
     };
     return world->link->calls->start(world->link, &setup);
 }

@@ -17,10 +17,10 @@ typedef struct {
     const taper_station_config_t *station; /**< its tick is a whole number of seconds */
     const taper_solver_t *solver;          /**< NULL: none was built in */
     const sim_policy_t *policy;
+    uint16_t iterations; /**< of the solver in a tick */
     const sim_sessions_t *sessions;
     const sim_course_t *limits; /**< nowhere above the station's own site limit */
     const sim_course_t *prices; /**< of energy, per kWh; NULL: none */
-    uint16_t iterations;        /**< of the solver in a tick; 0: taper_setup_iterations() */
     uint64_t seed;              /**< decides in which order nodes send, and nothing else */
     sim_link_t *link;           /**< the station; not started yet */
     FILE *problems;             /**< where the planning problems go; NULL: nowhere */

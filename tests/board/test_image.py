@@ -205,7 +205,7 @@ def test_a_call_that_hangs_ends_in_the_watchdog_s_report(board: Emulator, drive:
         drive.call(POLL, 20)
     (report,) = reports(board.text())
     assert (report["exception"], "watchdog" in report["line"]) == ("2", True)
-    assert int(report["pc"], 16) == address_of(image, "taper_station_poll")
+    assert 0 <= int(report["pc"], 16) - address_of(image, "taper_station_poll") < len(HANG)
 
 
 def test_the_watchdog_resets_even_when_its_report_hangs(board: Emulator, drive: Drive, image: Path) -> None:

@@ -4,7 +4,7 @@ import os
 import socket
 import subprocess
 import threading
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import pytest
 from conftest import csv_text, session
@@ -38,7 +38,7 @@ def board_that(answer):
 
         def serve():
             connection, _ = server.accept()
-            with connection:
+            with connection, suppress(ConnectionError):
                 answer(connection)
 
         thread = threading.Thread(target=serve)
@@ -87,13 +87,14 @@ def test_a_board_has_the_policies_of_the_firmware(sim, policy):
 
 def test_ticks_in_slices_give_the_same_bytes(planning_sim):
     planning_sim.write("short.csv", csv_text([session("a", departure_s=600, max_kw=20), session("b", departure_s=400)]))
-    common = ["--sessions", "short.csv", "--policy", "soc-mpc", "--station", "hub", "--tick-s", "1"]
+    common = ["--sessions", "short.csv", "--policy", "soc-mpc", "--station", "hub", "--tick-s", "1",
+              "--iterations", "10"]
     here = planning_sim.call(*common, "--out", "here", "--frames", "here.log", out="here")
     with twin() as bus:
         there = planning_sim.call(*common, "--out", "there", "--frames", "there.log", "--bus", bus, out="there")
     assert_equal(here, there)
     work = there.summary["board"]["instructions_per_tick"]
-    assert work["max"] > work["max_without_slice"] == work["p50"] == 1000
+    assert (work["p50"], work["max"], work["max_without_slice"]) == (1000, 1010, 1000)
 
 
 def test_lines_may_be_cut_anywhere(sim):
@@ -226,6 +227,18 @@ def test_answers_out_of_turn_are_refused(sim):
     assert "where the number of its connectors was awaited" in done.stderr
 
 
+def test_a_peer_that_sends_without_end_is_given_up(sim):
+    def answer(connection):
+        connection.sendall(HELLO % b"01000000" + b"t0010\r" * 5000)
+        while connection.recv(1000):
+            pass
+
+    with board_that(answer) as bus:
+        done = run(sim, "--bus", bus, policy="edf")
+    assert done.code == 1
+    assert "it sends more than 4096 frames, where the number of its connectors was awaited" in done.stderr
+
+
 def test_nobody_there_is_told(sim):
     with socket.create_server(("127.0.0.1", 0)) as server:
         address = f"127.0.0.1:{server.getsockname()[1]}"
@@ -239,7 +252,7 @@ def test_nobody_there_is_told(sim):
     (["--bus", "slcan::1"], "--bus: must be slcan:HOST:PORT: 'slcan::1'"),
     (["--bus", "slcan:localhost:1", "--policy", "equal-share"], "--policy equal-share: a board (--bus) does not have it"),
     (["--bus", "slcan:localhost:1", "--problems", "x"], "--problems and --bus exclude each other"),
-    (["--bus", "slcan:localhost:1", "--station", "caltech"], "--bus: station caltech has 2 CAN buses"),
+    (["--bus", "slcan:localhost:1", "--station", "paper"], "--bus: station paper has 3 CAN buses"),
     (["--bus-timeout-s", "5"], "--bus-timeout-s needs --bus"),
     (["--bus", "slcan:localhost:1", "--bus-timeout-s", "0"], "--bus-timeout-s"),
 ])

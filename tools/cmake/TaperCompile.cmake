@@ -22,6 +22,15 @@ if(TAPER_SANITIZE)
     add_link_options(-fsanitize=address,undefined)
 endif()
 
+# 32-bit Linux: dates after 2038, recordings of more than 2 GB, and files with large inode numbers.
+if(CMAKE_SYSTEM_NAME STREQUAL Linux AND CMAKE_SIZEOF_VOID_P EQUAL 4)
+    add_compile_definitions(_FILE_OFFSET_BITS=64 _TIME_BITS=64)
+endif()
+
+if(TAPER_STATIC)
+    string(APPEND CMAKE_EXE_LINKER_FLAGS " -static")
+endif()
+
 # Our own code: every warning is an error. Generated and foreign code does not link this.
 add_library(taper_strict INTERFACE)
 target_compile_options(taper_strict INTERFACE

@@ -10,7 +10,7 @@
 typedef enum {
     COPY_NEVER, /**< nothing was ever written there */
     COPY_BAD,
-    COPY_OTHER, /**< sound as far as it can be told, of another area or layout */
+    COPY_OTHER, /**< sound, of another area or layout */
     COPY_GOOD,
 } copy_kind_t;
 
@@ -33,7 +33,7 @@ static uint32_t crc_at(const uint8_t *bytes, uint32_t offset) {
 /** The rest of a copy whose header is in `bytes`: sound or not, ours or not. */
 static copy_kind_t judge_body(const taper_stored_area_t *area, unsigned copy, uint32_t length) {
     if (length > area->capacity - TAPER_STORED_ENVELOPE) {
-        return COPY_OTHER; /* no record of ours is so long */
+        return COPY_BAD; /* no record of ours is so long: rotten, or of a larger image */
     }
     const uint32_t covered = TAPER_STORED_HEADER + length;
     if (!area->port->store_read(area->port->context, area->area, copy, area->bytes,

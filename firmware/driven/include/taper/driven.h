@@ -56,9 +56,9 @@ typedef struct {
 } taper_driven_t;
 
 /**
- * Nobody drives yet, unless a simulation had the clock when the board was reset: `is_driven`. `options` and `board` are copied; `slcan`, `station` and what the options point to must outlive
- * `driven`. The port of the options sends and receives by `slcan`. A channel that is open already is greeted by the next
- * taper_driven_serve().
+ * Nobody drives yet, unless a simulation had the clock when the board was reset: `is_driven`. A channel that is open already
+ * is greeted by the next taper_driven_serve(). `options` and `board` are copied; `slcan`, `station` and what the options point
+ * to must outlive `driven`. The port of the options sends and receives by `slcan`.
  */
 void taper_driven_init(taper_driven_t *driven, taper_slcan_t *slcan, taper_station_t *station,
                        const taper_station_options_t *options, const taper_driven_board_t *board,

@@ -22,7 +22,7 @@ typedef enum {
 #define TAPER_STORE_COPIES 2u
 
 /** The longest record [bytes]: of the area TAPER_STORE_STATION of an image for its largest station. */
-#define TAPER_STORE_RECORD_MAX (64u + 96u * TAPER_MAX_CONNECTORS)
+#define TAPER_STORE_RECORD_MAX (64u + 104u * TAPER_MAX_CONNECTORS)
 
 typedef struct {
     void *context;
@@ -33,8 +33,8 @@ typedef struct {
      */
     bool (*receive)(void *context, taper_frame_t *frame);
 
-    /** Queue a frame for sending. @return false: the queue is full or the bus is off, the frame was not taken.
-        Must not block. */
+    /** Queue a frame for sending. @return false: the queue is full, the bus is off, or no bus carries it (a `bus` that is
+        not there, an identifier of more than 11 bits, a length above 8); the frame was not taken. Must not block. */
     bool (*send)(void *context, const taper_frame_t *frame);
 
     /** Called once at the end of every control tick that finished. NULL: the board has no watchdog. */
