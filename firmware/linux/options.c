@@ -145,7 +145,7 @@ static error_t parse(int key, char *text, struct argp_state *state) {
         break;
     case KEY_SCALE: setup->time_scale = whole("--time-scale", text, 1, TAPER_MAX_TIME_SCALE, state); break;
     case KEY_ITERATIONS:
-        setup->iterations = whole("--iterations", text, TAPER_MIN_SLICE, TAPER_MAX_ITERATIONS, state);
+        setup->iterations = whole("--iterations", text, 1, TAPER_MAX_ITERATIONS, state);
         break;
     case KEY_NO_PLANNER: setup->no_planner = true; break;
     case KEY_RECORD: chosen->record = text; break;

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 LIBRARIES = [Path(name) for name in os.environ["TAPER_CORE_LIBRARIES"].split(",")]
-FROM_OUTSIDE = re.compile(r"(mem(cpy|set|cmp|move)|sqrtf?|strcpy|stack_chk_fail|GLOBAL_OFFSET_TABLE_)$")
+FROM_OUTSIDE = re.compile(r"(mem(cpy|set|cmp|move)|sqrtf?|strcpy|strlen|stack_chk_fail|GLOBAL_OFFSET_TABLE_)$")
 HEAP_OR_STDIO = {"malloc", "calloc", "realloc", "free", "printf", "fprintf", "snprintf", "puts"}
 
 

@@ -178,7 +178,8 @@ bool taper_guard_passes(const taper_station_config_t *config, const taper_snapsh
         const taper_booking_t booking = booking_of(config, &snapshot->demand[i], i);
         add_current(&load[config->connectors[i].group], &booking, current_mA);
     }
-    for (uint8_t k = config->group_count; k-- > 0;) { /* children stand behind their parents */
+    const int32_t groups = taper_min_i32(config->group_count, TAPER_MAX_GROUPS); /* config_check.h: it is */
+    for (int32_t k = groups; k-- > 0;) { /* children stand behind their parents */
         if (!load_passes(&config->groups[k], &load[k], k == 0 ? supply->phase_mA : as_described)) {
             return false;
         }

@@ -11,7 +11,7 @@
 static bool options_are_sound(const taper_station_options_t *options) {
     return options->config != NULL && options->port != NULL && options->port->receive != NULL &&
            options->port->send != NULL && (options->policy == NULL || options->policy->propose != NULL) &&
-           options->iterations_per_tick >= TAPER_MIN_SLICE && options->time_scale <= TAPER_MAX_TIME_SCALE;
+           options->iterations_per_tick >= 1 && options->time_scale <= TAPER_MAX_TIME_SCALE;
 }
 
 static void init_layers(taper_station_t *station) {

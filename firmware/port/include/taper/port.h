@@ -33,8 +33,8 @@ typedef struct {
      */
     bool (*receive)(void *context, taper_frame_t *frame);
 
-    /** Queue a frame for sending. @return false: the queue is full or the bus is off, the frame was not taken.
-        Must not block. */
+    /** Queue a frame for sending. @return false: the queue is full, the bus is off, or no bus carries it (a `bus` that is
+        not there, an identifier of more than 11 bits, a length above 8); the frame was not taken. Must not block. */
     bool (*send)(void *context, const taper_frame_t *frame);
 
     /** Called once at the end of every control tick that finished. NULL: the board has no watchdog. */
