@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "taper/membus.h"
+#include "taper/planner.h"
 #include "taper/stations.h"
 #include "unity.h"
 
