@@ -210,6 +210,7 @@ const rig_t rig = {
                 [RIG_EXTENDED_REMOTE] = true,
                 [RIG_ERROR] = true,
                 [RIG_FD] = true},
+    .record_max = TAPER_STORE_RECORD_MAX,
     .port = &port,
     .start = start,
     .stop = stop,
