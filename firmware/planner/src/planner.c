@@ -73,7 +73,11 @@ taper_status_t taper_planner_init(taper_planner_t *planner, const taper_solver_t
     memset(planner, 0, sizeof *planner);
     planner->solver = solver;
     taper_horizon_shape(&planner->horizon, config);
-    if (!solver_fits(solver, &planner->horizon) || !load_matrices(planner)) {
+    if (!solver_fits(solver, &planner->horizon)) {
+        return TAPER_ERR_CONFIG;
+    }
+    (void)osqp_update_rho(solver->osqp, LEAST_RHO); /* a fresh solver has nothing to factorise yet */
+    if (!load_matrices(planner)) {
         return TAPER_ERR_CONFIG;
     }
     solver->osqp->settings->eps_abs = ABSOLUTE_TOLERANCE;

@@ -61,7 +61,7 @@ typedef struct {
 /**
  * Tie a planner to its solver.
  * @return TAPER_ERR_CONFIG if the solver was generated for another shape than `config`, or refuses its matrices.
- * Cost: a factorisation.
+ * Cost: two factorisations.
  */
 taper_status_t taper_planner_init(taper_planner_t *planner, const taper_solver_t *solver,
                                   const taper_station_config_t *config);
