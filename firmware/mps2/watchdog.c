@@ -2,6 +2,8 @@
 
 #include "registers.h"
 
+#define CYCLES_PER_ms (MPS2_CLOCK_Hz / 1000u)
+
 static void set(uint32_t control) {
     MPS2_WATCHDOG->lock = MPS2_WATCHDOG_UNLOCK;
     MPS2_WATCHDOG->control = control;
@@ -10,7 +12,8 @@ static void set(uint32_t control) {
 
 void mps2_watchdog_start(uint32_t ms) {
     MPS2_WATCHDOG->lock = MPS2_WATCHDOG_UNLOCK;
-    MPS2_WATCHDOG->load = ms * (MPS2_CLOCK_Hz / 1000u);
+    MPS2_WATCHDOG->load = ms < UINT32_MAX / CYCLES_PER_ms ? ms * CYCLES_PER_ms : UINT32_MAX;
+    MPS2_WATCHDOG->clear = 1; // it counts while it is stopped too, and what ran out then would strike at once
     set(MPS2_WATCHDOG_NMI | MPS2_WATCHDOG_RESET);
 }
 
