@@ -297,7 +297,9 @@ class CompilerInfo:
         file, line, column = place.rsplit(":", 2)
         text = Path(file).read_text().splitlines()[int(line) - 1][int(column) - 1:]
         expression = re.match(r"[\w.>\-\[\]]+", text)
-        return f"{self._short(file)}: {expression[0] if expression else text}"
+        if not expression:
+            raise StackUnknown(f"{place}: no call stands there: the source is newer than the image; build it")
+        return f"{self._short(file)}: {expression[0]}"
 
 
 def pushed_B(name: str, operands: str) -> int:
