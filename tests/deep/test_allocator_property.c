@@ -202,7 +202,8 @@ static void test_limits_hold_for_a_hundred_thousand_hostile_proposals_on_any_tre
         }
         with_current += assert_connectors_hold() ? 1 : 0;
     }
-    TEST_ASSERT_GREATER_THAN_UINT(PROPOSALS * 3 / 10, with_current); /* one that gives nothing is not safe, it is off */
+    TEST_ASSERT_GREATER_THAN_UINT(PROPOSALS * 3 / 10,
+                                  with_current); /* one that gives nothing is not safe, it is off */
 }
 
 /** Setpoints that nobody bounded: the guard and the phasors agree, but for what rounding decides. */

@@ -31,6 +31,7 @@ typedef struct {
 typedef struct {
     const char *name;
     rig_has_t has;
+    uint32_t record_max;         /**< TAPER_STORE_RECORD_MAX where the port was built; at most that of here */
     bool carries[RIG_BAD_KINDS]; /**< what the medium can carry; else nobody can send it */
 
     /** The station's end. Set by start(). */
@@ -65,8 +66,8 @@ typedef struct {
     void (*restart)(void);
 
     /**
-     * Power goes in the next write to the store, after `bytes` of it: the write answers false. NULL: a write of this store is
-     * done or not done, and cannot be cut.
+     * Power goes in the next write to the store, after `bytes` of it: the write answers false. NULL: there is no way to cut a
+     * write of this port from here.
      */
     void (*tear_next_write)(uint32_t bytes);
 } rig_t;

@@ -56,6 +56,7 @@ static void tear_next_write(uint32_t bytes) {
 const rig_t rig = {
     .name = "membus",
     .has = {.bus_is_off = true, .receive_overflows = true, .store = true},
+    .record_max = TAPER_STORE_RECORD_MAX,
     .port = &port,
     .start = start,
     .stop = nothing,

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "taper/membus.h"
+#include "taper/planner.h"
 #include "taper/stations.h"
 #include "unity.h"
 
@@ -134,7 +135,7 @@ static void test_of_settings_with_one_that_is_out_of_range_none_is_used(void) {
     bad[9].price_weight_permille = 1001;
     bad[10].price_weight_permille = -1;
     bad[11].tick_ms = UINT32_MAX;
-    bad[12].iterations_per_tick = 9;
+    bad[12].iterations_per_tick = TAPER_MAX_ITERATIONS + 1;
     bad[13].proposer = TAPER_PROPOSER_LLF + 1;
     bad[14].limit_W = INT32_MAX;
     bad[15].limit_W = TAPER_ABSENT + 1;
