@@ -14,8 +14,6 @@ from taperlib.emulator import Emulator
 SECONDS = 60
 ARRIVAL_s = 3600
 _HEAD = "session_id,connector,arrival_s,departure_s,expected_departure_s,battery_kwh,soc_arrival,soc_target,max_kw,taper_kw"
-_ITERATIONS = re.compile(r"^fn=.*\n", re.MULTILINE)
-
 
 @dataclass(frozen=True)
 class Scene:
