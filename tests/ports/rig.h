@@ -31,7 +31,6 @@ typedef struct {
 typedef struct {
     const char *name;
     rig_has_t has;
-    uint32_t record_max;         /**< TAPER_STORE_RECORD_MAX where the port was built; at most that of here */
     bool carries[RIG_BAD_KINDS]; /**< what the medium can carry; else nobody can send it */
 
     /** The station's end. Set by start(). */
@@ -61,6 +60,9 @@ typedef struct {
 
     /** The controller leaves the bus, to come back when restart_bus() asks. NULL with has.bus_is_off false. */
     void (*bus_off)(void);
+
+    /** TAPER_STORE_RECORD_MAX where the port was built; at most that of here. NULL with has.store false. */
+    uint32_t (*record_max)(void);
 
     /** Power goes and comes back at the station: its store stays, what waited is gone. */
     void (*restart)(void);

@@ -19,8 +19,6 @@
 #include "unity.h"
 
 #define EMULATOR "qemu-system-arm"
-/** Of the image's station, hub. */
-#define RECORD_MAX (64u + 96u * 8u)
 /** REMOTE_WORDS has room for them. */
 #define RECEIVED_AT_ONCE 100u
 
@@ -250,10 +248,13 @@ static void start(uint32_t begin_ms) {
     slcan_world_init(&control, &control_stream, wait_for_bytes, &control_fd);
     (void)answer_of(REMOTE_HELLO);
     (void)ask(REMOTE_SET_NOW, 0, begin_ms);
-    TEST_ASSERT_EQUAL_UINT32(RECORD_MAX, ask(REMOTE_RECORD_MAX, 0, 0));
     port = port_of_board();
     TEST_ASSERT_EQUAL_HEX32(0, ask(REMOTE_HAS, 0, 0) & REMOTE_HAS_BUS_IS_OFF);
     slcan_world_open(&world);
+}
+
+static uint32_t record_max(void) {
+    return ask(REMOTE_RECORD_MAX, 0, 0);
 }
 
 static void restart(void) {
@@ -286,7 +287,6 @@ static void jam(bool is_jammed) {
 const rig_t rig = {
     .name = "board",
     .has = {.kick_watchdog = true, .clock_us = true, .receive_overflows = true, .store = true},
-    .record_max = RECORD_MAX,
     .carries = SLCAN_WORLD_CARRIES,
     .port = &port,
     .start = start,
@@ -298,6 +298,7 @@ const rig_t rig = {
     .settle = settle,
     .hear = hear,
     .jam = jam,
+    .record_max = record_max,
     .restart = restart,
 };
 

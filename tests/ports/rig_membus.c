@@ -45,6 +45,10 @@ static void bus_off(void) {
     taper_membus_bus_off(&bus, 0, 1);
 }
 
+static uint32_t record_max(void) {
+    return TAPER_STORE_RECORD_MAX;
+}
+
 static void restart(void) {
     taper_membus_power_cycle(&bus);
 }
@@ -56,7 +60,6 @@ static void tear_next_write(uint32_t bytes) {
 const rig_t rig = {
     .name = "membus",
     .has = {.bus_is_off = true, .receive_overflows = true, .store = true},
-    .record_max = TAPER_STORE_RECORD_MAX,
     .port = &port,
     .start = start,
     .stop = nothing,
@@ -68,6 +71,7 @@ const rig_t rig = {
     .hear = hear,
     .jam = jam,
     .bus_off = bus_off,
+    .record_max = record_max,
     .restart = restart,
     .tear_next_write = tear_next_write,
 };

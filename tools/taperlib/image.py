@@ -72,7 +72,7 @@ class Piece:
 
     @property
     def object(self) -> str:
-        return re.sub(r"(\.c)?\.obj?$", "", re.sub(r".*[/(]", "", self.file).rstrip(")"))
+        return re.sub(r"(\.c)?\.o(bj)?$", "", re.sub(r".*[/(]", "", self.file).rstrip(")"))
 
     @property
     def is_solver_workspace(self) -> bool:
@@ -140,6 +140,11 @@ class Image:
         lines = run("size", "-A", self.elf).splitlines()
         fields = [line.split() for line in lines]
         return {field[0]: int(field[1]) for field in fields if len(field) == 3 and field[1].isdigit()}
+
+    def stack_sizes(self) -> tuple[int, int]:
+        """Of the stack, and of the one for faults [B]."""
+        at = {symbol.name: symbol.address for symbol in self.symbols}
+        return at["mps2_stack_top"] - at["mps2_stack_limit"], at["mps2_fault_stack_top"] - at["mps2_stack_top"]
 
     def struct_size_B(self, typedef: str) -> int:
         """Size of a structure type, from the debugging information."""

@@ -65,6 +65,7 @@ static void forget(taper_planner_t *planner) {
     memset(solver->osqp->solution->x, 0, (size_t)solver->variables * sizeof(OSQPFloat));
     memset(solver->osqp->solution->y, 0, (size_t)solver->rows * sizeof(OSQPFloat));
     planner->matrix_is_current = false;
+    taper_forget_equalities(solver->osqp);
     osqp_cold_start(solver->osqp);
 }
 
