@@ -128,6 +128,8 @@ def report(build: Build, summary: dict, limit_kw: float, seconds: float) -> list
         f"  instructions      per tick: median {number(per_tick['p50'])}, worst {number(per_tick['max'])}, "
         f"worst without a solver slice {number(per_tick['max_without_slice'])}",
         f"                    per poll: worst {number(board['max_instructions_per_poll'])}",
+        f"                    per frame, taken in as it comes: mean {number(board['mean_instructions_per_frame'])}, "
+        f"all of a tick: worst {number(board['max_instructions_for_frames_of_tick'])}",
         *memory_lines(Image(build.image)),
         f"  stack             {stack}",
         f"  map               {build.map.relative_to(ROOT)}",

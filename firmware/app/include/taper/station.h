@@ -252,6 +252,12 @@ void taper_station_step(taper_station_t *station, uint32_t now_ms);
 void taper_station_poll(taper_station_t *station, uint32_t now_ms);
 
 /**
+ * Take in the frames that have come, and do nothing else. A step and a poll begin with it. A board that calls it as frames come
+ * has them out of the way when the tick is due; what the station does is the same. Cost: constant for each frame.
+ */
+void taper_station_hear(taper_station_t *station, uint32_t now_ms);
+
+/**
  * Going down for good: every connector is told to use its fallback current. Call it two or three times, some 50 ms apart,
  * so that a lost frame does no harm; then do not step the station again.
  */
