@@ -13,14 +13,23 @@ _PATTERN_STORES = (
     ("        Lp[i + 1] = Lp[i] + Lnz[i]; // cumsum, total at the end\n", ""),
     ("            Li[tmpIdx] = k;\n", ""),
 )
+# What a source gives to the linker: functions and tables that begin a line and are not static. What OSQP leaves out of
+# an embedded build is found too; a name that nothing defines does no harm.
+_GLOBAL = re.compile(
+    r"^(?!(?:static|typedef|extern|struct|union)\b)[A-Za-z_][\w \t*]*[ \t*](\w+)(?:\(|[ \t]*(?:\[\w*\])*[ \t]*=)",
+    re.MULTILINE,
+)
+_COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL)
+_NAMES = "osqp_taper_names.h"
 _NOTICE = "/* Changed for Taper: QDLDL_factor() finds the pattern of L, Lp and Li, in place; it does not store it. */\n"
 
 
 def shared_sources(generated: Path) -> dict[str, str]:
     """Files of osqp/ by relative path, from a folder that OSQP has generated code into."""
     files = {path.relative_to(generated).as_posix(): path.read_text() for path in _wanted(generated)}
-    files["inc/public/osqp_configure.h"] = _undated((generated / "osqp_configure.h").read_text())
     files["src/qdldl.c"] = _without_pattern_stores(files["src/qdldl.c"])
+    files[f"inc/public/{_NAMES}"] = _names_header(files)
+    files["inc/public/osqp_configure.h"] = _with_names(_undated((generated / "osqp_configure.h").read_text()))
     return files
 
 
@@ -33,6 +42,26 @@ def _undated(text: str) -> str:
     if removed != 1:
         raise OsqpChanged("osqp_configure.h has no line with a date, or several")
     return text
+
+
+def _names_header(files: dict[str, str]) -> str:
+    """Gives every global of the sources the prefix taper_, so that an image can have an OSQP of its own besides."""
+    found = {name for path, text in files.items() if path.endswith(".c") for name in _GLOBAL.findall(_COMMENT.sub("", text))}
+    if not {"osqp_solve", "QDLDL_factor", "OSQP_STATUS_MESSAGE"} <= found:
+        raise OsqpChanged("the sources of OSQP are not written as this generator reads them")
+    defines = "".join(f"#define {name} taper_{name}\n" for name in sorted(found))
+    return (
+        "/** Globals of this copy of OSQP, under names that no other copy has. Generated, see codegen/. */\n"
+        f"#ifndef OSQP_TAPER_NAMES_H\n#define OSQP_TAPER_NAMES_H\n\n{defines}\n#endif\n"
+    )
+
+
+def _with_names(configuration: str) -> str:
+    """All sources of OSQP include its configuration first."""
+    guard = "#define OSQP_CONFIGURE_H\n"
+    if configuration.count(guard) != 1:
+        raise OsqpChanged("osqp_configure.h has no include guard as this generator knows it")
+    return configuration.replace(guard, f'{guard}\n#include "{_NAMES}"\n')
 
 
 def _without_pattern_stores(text: str) -> str:

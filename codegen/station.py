@@ -27,7 +27,7 @@ from toml_table import Table, load
 __all__ = ["Connector", "Group", "Station", "read_station"]
 
 # `osqp_`, `qdldl_` and `taper_` begin the names of other symbols in the image, and a station's name begins its own.
-RESERVED_NAMES = ("osqp", "qdldl", "taper")
+RESERVED_NAMES = ("osqp", "qdldl", "taper", "planner", "float", "double")  # the last three: components of the package
 TURN_s = 900  # what a turn lasts if the file does not say
 CHANGE_ms = 5000  # IEC 61851-1: a vehicle has this long to follow a new duty cycle
 

@@ -5,8 +5,8 @@ array in RAM. Here it is taken apart into its definitions, and written again:
 
 - Index arrays that nothing writes are `const`, so that they stay in flash. See CONSTANT.
 - Arrays of zeros have no initialiser: they cost RAM, but no flash to start it from.
-- The factorisation (L, D, 1/D) starts as zeros too. It is that of the generator's example values, of no use to
-  anyone: the firmware writes its own P and A and calls osqp_update_data_mat(), which factorises, before it solves.
+- What the firmware writes before it solves starts as zeros too: it would be that of the generator's example values, of
+  no use to anyone. See WRITTEN.
 - Vectors that nothing refers to (the scratch of data scaling, which is off) are left out.
 - All that the firmware has no business with is `static`.
 - Numbers are the shortest text that reads back as the same double or float.
@@ -36,8 +36,16 @@ CONSTANT = (
     *("linsys_P", "linsys_etree", "linsys_Lnz", "linsys_L_p", "linsys_L_i"),
 )
 
-# Written by the first osqp_update_data_mat(), see above.
-FACTORISATION = ("linsys_L_x", "linsys_D", "linsys_Dinv")
+# Written before the first iteration, in this order:
+#   work_rho_vec, work_rho_inv_vec, linsys_rho_inv_vec   by osqp_update_rho(), with the last part of the values of KKT
+#   the other values of KKT, and linsys_L_x, _D, _Dinv   by osqp_update_data_mat(), which factorises
+#   data_l_val, data_u_val                               by osqp_update_data_vec()
+# The values of P and A stay: they are the example that tells their pattern.
+WRITTEN = (
+    *("work_rho_vec_val", "work_rho_inv_vec_val", "linsys_rho_inv_vec"),
+    *("linsys_KKT_x", "linsys_L_x", "linsys_D", "linsys_Dinv"),
+    *("data_l_val", "data_u_val"),
+)
 
 # The firmware writes these values in place.
 SHARED = ("data_P_csc_x", "data_A_csc_x")
@@ -84,6 +92,11 @@ class Struct:
     fields: tuple[str, ...]
 
 
+def symbol(station: str, name: str) -> str:
+    """The C identifier of a part of a station's workspace."""
+    return f"taper_workspace_{station}_{name}"
+
+
 def number(value: float, real: Real) -> str:
     """The shortest literal that reads back as exactly `value`, or as the float nearest to it."""
     return repr(float(value)) if real == "double" else f"{np.float32(value)!s}F"
@@ -114,7 +127,7 @@ def _struct(found: re.Match[str]) -> Struct:
 def _array(found: re.Match[str]) -> Array:
     is_int = found[1] in _INT_TYPES
     name = _unprefixed(found[2])
-    if found[4] is None or name in FACTORISATION:
+    if found[4] is None or name in WRITTEN:
         return Array(name, is_int, int(found[3]), None)
     texts = [text.strip().removeprefix("(OSQPFloat)") for text in found[4].rstrip(",").split(",")]
     values = tuple(int(text) if is_int else float(text) for text in texts)
@@ -168,18 +181,19 @@ def render_header(parts: list[Array | Struct], station: str) -> str:
     """NAME_workspace.h."""
     guard = f"{station.upper()}_WORKSPACE_H"
     lengths = {part.name: part.length for part in parts if isinstance(part, Array)}
-    arrays = "".join(f"extern OSQPFloat {station}_{name}[{lengths[name]}];\n" for name in SHARED)
+    solver = symbol(station, "solver")
+    arrays = "".join(f"extern OSQPFloat {symbol(station, name)}[{lengths[name]}];\n" for name in SHARED)
     return (
         f"/** Solver of station {station}. One instance, not re-entrant. Values of A and P: write, then update. */\n"
         f"#ifndef {guard}\n#define {guard}\n\n"
-        f'#include "osqp_api_types.h"\n\nextern OSQPSolver {station}_solver;\n{arrays}\n#endif\n'
+        f'#include "osqp_api_types.h"\n\nextern OSQPSolver {solver};\n{arrays}\n#endif\n'
     )
 
 
 def _render_array(array: Array, station: str, real: Real) -> str:
     storage = "" if array.name in SHARED else "static const " if array.is_const else "static "
     kind = "OSQPInt" if array.is_int else "OSQPFloat"
-    declared = f"{storage}{kind} {station}_{array.name}[{array.length}]"
+    declared = f"{storage}{kind} {symbol(station, array.name)}[{array.length}]"
     if array.values is None:
         return f"{declared};\n"
     texts = [str(value) if array.is_int else number(value, real) for value in array.values]
@@ -202,7 +216,7 @@ def _render_struct(struct: Struct, station: str, real: Real, names: dict[str, Ar
     if struct.type in _FORGOTTEN_FIELD:
         fields.append(_FORGOTTEN_FIELD[struct.type])
     body = "".join(f"{_INDENT}{field},\n" for field in fields)
-    return f"{storage}{struct.type} {station}_{struct.name} = {{\n{body}}};\n"
+    return f"{storage}{struct.type} {symbol(station, struct.name)} = {{\n{body}}};\n"
 
 
 def _render_field(field: str, station: str, real: Real, names: dict[str, Array | Struct]) -> str:
@@ -214,4 +228,4 @@ def _render_field(field: str, station: str, real: Real, names: dict[str, Array |
 
 
 def _prefixed(word: str, station: str, names: dict[str, Array | Struct]) -> str:
-    return f"{station}_{word}" if word in names else word
+    return symbol(station, word) if word in names else word

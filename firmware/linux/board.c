@@ -83,13 +83,13 @@ static uint32_t receive_overflows(void *context) {
     return can->receive_overflows != NULL ? can->receive_overflows(can->context) : 0;
 }
 
-static bool store_read(void *context, unsigned copy, void *data, uint32_t length) {
-    return taper_store_read(((taper_board_t *)context)->store, copy, data, length);
+static bool store_read(void *context, unsigned area, unsigned copy, void *data, uint32_t length) {
+    return taper_store_read(((taper_board_t *)context)->store, area, copy, data, length);
 }
 
-static bool store_write(void *context, unsigned copy, const void *data, uint32_t length) {
+static bool store_write(void *context, unsigned area, unsigned copy, const void *data, uint32_t length) {
     taper_board_t *board = context;
-    const bool good = taper_store_write(board->store, copy, data, length);
+    const bool good = taper_store_write(board->store, area, copy, data, length);
     board->store_errors += good ? 0 : 1;
     return good;
 }

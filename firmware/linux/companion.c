@@ -12,6 +12,7 @@
 
 #include "arguments.h"
 #include "taper/stations.h"
+#include "taper/version.h"
 #include "whole_file.h"
 
 #define US_PER_MS 1000
@@ -233,7 +234,7 @@ static bool read_times(const reader_t *reader, taper_companion_t *companion) {
     uint64_t iterations = 0;
     if (!whole(reader, KEY_TICK, TAPER_SETUP_TICK_MIN_ms, TAPER_SETUP_TICK_MAX_ms, &tick_ms) ||
         !whole(reader, KEY_SCALE, 1, TAPER_MAX_TIME_SCALE, &scale) ||
-        !whole(reader, KEY_ITERATIONS, TAPER_MIN_SLICE, TAPER_MAX_ITERATIONS, &iterations) ||
+        !whole(reader, KEY_ITERATIONS, 1, TAPER_MAX_ITERATIONS, &iterations) ||
         !whole(reader, KEY_START, 0, LATEST_us, &companion->start_us)) {
         return false;
     }

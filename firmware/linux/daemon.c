@@ -14,6 +14,7 @@
 #include "events.h"
 #include "report.h"
 #include "taper/stations.h"
+#include "taper/version.h"
 
 _Static_assert(TAPER_COMPANION_BUSES >= TAPER_SOCKETCAN_BUSES, "a companion must hold all interfaces");
 

@@ -35,8 +35,8 @@ taper_event_kind_t taper_event_kind(uint8_t code) {
         KIND(SESSION_ENDED, INFO, "session");
         KIND(CURVE_SET, INFO, "points");
         KIND(TRANSFER_REFUSED, WARNING, "data");
-        KIND(STORE_OLD_COPY, WARNING, NULL);
-        KIND(STORE_RESET, ERROR, NULL);
+        KIND(STORE_OLD_COPY, WARNING, "record");
+        KIND(STORE_RESET, ERROR, "record");
         KIND(EMCY_HEARD, WARNING, "code");
         KIND(LIMIT_NEGATIVE, WARNING, "limit_W");
         KIND(GUARD, ERROR, "fallback");
@@ -50,6 +50,7 @@ taper_event_kind_t taper_event_kind(uint8_t code) {
         KIND(PRICE_SET, INFO, "points");
         KIND(LIMIT_FLAPS, WARNING, "before_W");
         KIND(QUEUED, WARNING, "place");
+        KIND(SESSION_RESUMED, INFO, "session");
     }
     return (taper_event_kind_t){NULL, TAPER_LOG_WARNING, "data"};
 }

@@ -59,6 +59,7 @@ uint32_t taper_log_dropped(void) {
 
 /** RFC 3339, UTC, milliseconds. */
 static void format_time(char text[32], uint64_t time_us) {
+    _Static_assert(sizeof(time_t) == 8, "dates after 2038");
     const time_t seconds = (time_t)(time_us / US_PER_S);
     struct tm parts;
     char day[24];

@@ -6,6 +6,7 @@
 
 #include "arguments.h"
 #include "taper/stations.h"
+#include "taper/version.h"
 
 #define LONGEST_NAME    15 // of a network interface
 #define UNKNOWN_STATION UINT32_MAX
@@ -59,12 +60,12 @@ static const struct argp_option options[] = {
     {"tick-ms", KEY_TICK, "N", 0, "Control tick [ms], 20..1000 (default: the station's own, 1000)", 0},
     {"time-scale", KEY_SCALE, "S", 0, "Simulation: run S times faster, 1..1000 (default: 1; see below)", 0},
     {"iterations", KEY_ITERATIONS, "N", 0,
-     "Solver iterations in a control tick, 10..500 (default: 50; 500 if the tick stands for 10 s or more)",
+     "Solver iterations in a control tick, 1..500; fewer than 10 bound its work (default: 50; 500 if the "
+     "tick stands for 10 s or more)",
      0},
     {"no-planner", KEY_NO_PLANNER, NULL, 0, "Charge by earliest deadline first", 0},
     {"record", KEY_RECORD, "FILE", 0, "Record all frames in this file (see below)", 0},
-    {"store", KEY_STORE, "FILE", 0, "Keep what outlives a restart in FILE.0 and FILE.1 (default: nowhere)",
-     0},
+    {"store", KEY_STORE, "FILE", 0, "Keep what outlives a restart in FILE.0, FILE.1 (default: nowhere)", 0},
     {"log-level", KEY_LOG_LEVEL, "L", 0, "error, warning, info or debug (default: info)", 0},
     {0},
 };
@@ -144,7 +145,7 @@ static error_t parse(int key, char *text, struct argp_state *state) {
         break;
     case KEY_SCALE: setup->time_scale = whole("--time-scale", text, 1, TAPER_MAX_TIME_SCALE, state); break;
     case KEY_ITERATIONS:
-        setup->iterations = whole("--iterations", text, TAPER_MIN_SLICE, TAPER_MAX_ITERATIONS, state);
+        setup->iterations = whole("--iterations", text, 1, TAPER_MAX_ITERATIONS, state);
         break;
     case KEY_NO_PLANNER: setup->no_planner = true; break;
     case KEY_RECORD: chosen->record = text; break;

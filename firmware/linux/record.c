@@ -10,6 +10,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+_Static_assert(sizeof(off_t) == 8, "a recording grows beyond 2 GB within a day");
+
 static bool name(char text[PATH_MAX], const char *file, const char *suffix) {
     if ((size_t)snprintf(text, PATH_MAX, "%s%s", file, suffix) >= PATH_MAX) {
         errno = ENAMETOOLONG;

@@ -1,4 +1,7 @@
-/** The station's non-volatile store: copy k of its record is the file PATH.k, replaced as a whole or not at all. */
+/**
+ * The station's non-volatile store: copy k of its record is the file PATH.k, that of its settings PATH.settings.k. A file is
+ * replaced as a whole or not at all.
+ */
 #ifndef TAPER_LINUX_STORE_H
 #define TAPER_LINUX_STORE_H
 
@@ -6,9 +9,9 @@
 #include <stdint.h>
 
 /** @return whether the file could be read. Of one that is too short the rest is zero: the station's CRC-32 refuses it. */
-bool taper_store_read(const char *path, unsigned copy, void *data, uint32_t length);
+bool taper_store_read(const char *path, unsigned area, unsigned copy, void *data, uint32_t length);
 
-/** Write to PATH.k.new, to the disk, then rename. @return false, with errno: PATH.k is as it was. Blocks for the disk. */
-bool taper_store_write(const char *path, unsigned copy, const void *data, uint32_t length);
+/** Write a new file, to the disk, then rename it. @return false, with errno: the copy is as it was. Blocks for the disk. */
+bool taper_store_write(const char *path, unsigned area, unsigned copy, const void *data, uint32_t length);
 
 #endif

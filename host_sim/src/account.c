@@ -72,17 +72,16 @@ void sim_account_pass(sim_account_t *account, double now_s) {
     account->at_s = now_s;
 }
 
-static void write_connectors(const sim_account_t *account, const taper_station_t *station) {
+static void write_connectors(const sim_account_t *account, const taper_outlook_t *outlook) {
     for (unsigned i = 0; i < connectors(account); i++) {
         const sim_evse_t *evse = &account->fleet->evse[i];
         if (evse->vehicle != NULL) {
-            const taper_outlook_t outlook = taper_station_outlook(station, (uint8_t)i);
             const sim_connector_row_t row = {.time_s = account->begin_s,
                                              .connector = i,
                                              .evse = evse,
                                              .soc = account->soc[i],
                                              .current_A = account->A_s[i] / account->fleet->tick_s,
-                                             .outlook = &outlook};
+                                             .outlook = outlook == NULL ? NULL : &outlook[i]};
             sim_results_connector(account->results, &row);
         }
     }
@@ -102,11 +101,11 @@ static void note_breach(const sim_account_t *account) {
     account->results->violation_ticks++;
 }
 
-void sim_account_end(sim_account_t *account, const taper_station_t *station) {
+void sim_account_end(sim_account_t *account, taper_mode_t mode, const taper_outlook_t *outlook) {
     const double tick_s = account->fleet->tick_s;
     sim_account_pass(account, (double)account->begin_s + tick_s);
     note_breach(account);
     sim_results_step(account->results, account->begin_s, account->limit_kw,
-                     account->site_kwh * 3600.0 / tick_s, account->active, taper_station_mode(station));
-    write_connectors(account, station);
+                     account->site_kwh * 3600.0 / tick_s, account->active, mode);
+    write_connectors(account, outlook);
 }

@@ -12,7 +12,7 @@
 #include "limits_csv.h"
 #include "loads.h"
 #include "results.h"
-#include "taper/station.h"
+#include "taper/message.h"
 
 /** All pointers are borrowed. */
 typedef struct {
@@ -39,7 +39,8 @@ void sim_account_pass(sim_account_t *account, double now_s);
 /** The connectors obey other setpoints from now on. */
 void sim_account_obey(sim_account_t *account);
 
-/** The rest of the tick passes, and all of it is written down; `station` tells why. */
-void sim_account_end(sim_account_t *account, const taper_station_t *station);
+/** The rest of the tick passes, and all of it is written down. `outlook` of every connector with a vehicle tells why;
+    NULL: not known. */
+void sim_account_end(sim_account_t *account, taper_mode_t mode, const taper_outlook_t *outlook);
 
 #endif

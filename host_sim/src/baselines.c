@@ -3,6 +3,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "taper/drive.h"
 #include "taper/fallback.h"
 
 static void propose_edf(void *tick_ms, const taper_snapshot_t *snapshot, int32_t site_limit_W,
@@ -66,12 +67,12 @@ static void propose_equal_share(void *tick_ms, const taper_snapshot_t *snapshot,
 }
 
 const sim_policy_t sim_policies[] = {
-    {"soc-mpc", "planner that knows the taper", true, NULL},
-    {"mpc", "the same planner, without the taper", false, NULL},
-    {"edf", "earliest deadline first, without the taper", false, propose_edf},
-    {"edf-soc", "earliest deadline first, clamped to the taper", true, propose_edf},
-    {"llf", "least laxity first, clamped to the taper", true, propose_llf},
-    {"equal-share", "equal parts of the site limit, without the taper", false, propose_equal_share},
+    {"soc-mpc", "planner that knows the taper", true, NULL, TAPER_DRIVE_PLANNER},
+    {"mpc", "the same planner, without the taper", false, NULL, TAPER_DRIVE_PLANNER},
+    {"edf", "earliest deadline first, without the taper", false, propose_edf, TAPER_DRIVE_EDF},
+    {"edf-soc", "earliest deadline first, clamped to the taper", true, propose_edf, TAPER_DRIVE_EDF},
+    {"llf", "least laxity first, clamped to the taper", true, propose_llf, TAPER_DRIVE_LLF},
+    {"equal-share", "equal parts of the site limit, without the taper", false, propose_equal_share, -1},
 };
 const unsigned sim_policy_count = sizeof sim_policies / sizeof sim_policies[0];
 

@@ -42,6 +42,9 @@ sim_load_t sim_load_of(const taper_station_config_t *station, unsigned i, unsign
     const taper_connector_config_t *connector = &station->connectors[i];
     const double kw_per_A = (double)connector->voltage_mV / 1e6;
     sim_load_t load = {0};
+    if (current_A == 0.0) { // most connectors, most of the time
+        return load;
+    }
     if (connector->is_dc) {
         load.kw = current_A * kw_per_A * 1000.0 / (double)connector->efficiency_permille;
         for (unsigned phase = 0; phase < 3; phase++) {
@@ -81,20 +84,28 @@ static sim_breach_t check_lines(const taper_station_config_t *station, sim_limit
     return worst;
 }
 
-static sim_breach_t check_group(const taper_station_config_t *station, unsigned g, const sim_load_t *sum,
-                                double told_kw) {
+static sim_breach_t check_currents(const taper_station_config_t *station, unsigned g, const sim_load_t *sum) {
     const taper_group_config_t *limits = &station->groups[g];
-    const double own_kw = limits->limit_W > 0 ? (double)limits->limit_W / 1000.0 : (double)INFINITY;
     double line_A[3];
     double delta_A[3];
     for (unsigned line = 0; line < 3; line++) {
         line_A[line] = cabs(sum->line_A[line]);
         delta_A[line] = cabs(sum->line_A[line] - sum->line_A[(line + 2) % 3]);
     }
+    return sim_breach_worse(check_lines(station, SIM_PHASE, g, line_A, limits->limit_mA),
+                            check_lines(station, SIM_DELTA, g, delta_A, limits->delta_mA));
+}
+
+static sim_breach_t check_group(const taper_station_config_t *station, unsigned g, const sim_load_t *sum,
+                                double told_kw) {
+    const taper_group_config_t *limits = &station->groups[g];
+    const double own_kw = limits->limit_W > 0 ? (double)limits->limit_W / 1000.0 : (double)INFINITY;
     const sim_breach_t power = {.kind = SIM_POWER, .group = g};
-    sim_breach_t worst = above(power, sum->kw, fmin(own_kw, told_kw), 1.0);
-    worst = sim_breach_worse(worst, check_lines(station, SIM_PHASE, g, line_A, limits->limit_mA));
-    return sim_breach_worse(worst, check_lines(station, SIM_DELTA, g, delta_A, limits->delta_mA));
+    const sim_breach_t worst = above(power, sum->kw, fmin(own_kw, told_kw), 1.0);
+    if (limits->limit_mA == 0 && limits->delta_mA == 0) { // no square roots for nothing
+        return worst;
+    }
+    return sim_breach_worse(worst, check_currents(station, g, sum));
 }
 
 static void add(sim_load_t *sum, const sim_load_t *load) {

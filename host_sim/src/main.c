@@ -13,6 +13,8 @@
 #include "results.h"
 #include "sessions.h"
 #include "setup.h"
+#include "station_board.h"
+#include "station_local.h"
 #include "taper/stations.h"
 #include "world.h"
 
@@ -60,32 +62,61 @@ static int run_case(const sim_options_t *options, const sim_case_t *run) {
     return code;
 }
 
-/** Where the planning problems go. @return false, after one line on stderr, if they cannot go there. */
-static bool open_problems(const sim_options_t *options, FILE **file) {
-    *file = NULL;
-    if (options->problems_file == NULL) {
-        return true;
+/** Files that are written in the course of a run. */
+typedef struct {
+    FILE *problems, *frames; /**< NULL: not wanted */
+} logs_t;
+
+/** @return false, after one line on stderr, if a file of this name cannot be written. */
+static bool open_log(FILE **file, const char *name) {
+    if (name != NULL) {
+        *file = fopen(name, "w");
+        if (*file == NULL) {
+            perror(name);
+        }
     }
-    *file = fopen(options->problems_file, "w");
-    if (*file == NULL) {
-        perror(options->problems_file);
-    }
-    return *file != NULL;
+    return name == NULL || *file != NULL;
 }
 
-static bool close_problems(const sim_options_t *options, FILE *file) {
-    if (file != NULL && fclose(file) != 0) {
-        perror(options->problems_file);
+/** @return false, after one line on stderr, if not all of it was written. */
+static bool close_log(FILE *file, const char *name) {
+    if (file == NULL) {
+        return true;
+    }
+    const bool failed = ferror(file) != 0;
+    if (fclose(file) != 0 || failed) {
+        perror(name);
         return false;
     }
     return true;
 }
 
+static bool close_logs(const sim_options_t *options, const logs_t *logs) {
+    const bool good = close_log(logs->problems, options->problems_file);
+    return close_log(logs->frames, options->frames_file) && good;
+}
+
 static void note_missing_planner(const sim_options_t *options) {
-    if (options->policy->propose == NULL && taper_setup_solver(options->station) == NULL) {
+    if (options->bus == NULL && options->policy->propose == NULL &&
+        taper_setup_solver(options->station) == NULL) {
         fprintf(stderr, "taper-sim: note: this build has no planner; %s charges by earliest deadline first\n",
                 options->policy->name);
     }
+}
+
+/** `value` in thousandths; negative: not given. */
+static int32_t given_milli(double value) {
+    return value >= 0.0 ? (int32_t)lround(value * 1000.0) : TAPER_ABSENT;
+}
+
+/** The station: in this program, or on the board that the options name. */
+static bool open_link(const sim_options_t *options, sim_link_t **link) {
+    const sim_board_options_t board = {.address = options->bus,
+                                       .timeout_s = options->bus_timeout_s,
+                                       .min_mA = given_milli(options->min_current_A),
+                                       .price_weight_permille = given_milli(options->price_weight)};
+    *link = options->bus == NULL ? sim_station_local() : sim_station_board(&board);
+    return *link != NULL;
 }
 
 /** With all options known: read the files and run. @return the exit code of the program. */
@@ -93,26 +124,35 @@ static int load_and_run(const sim_options_t *options, const taper_station_config
     sim_course_t limits = {0};
     sim_course_t prices = {0};
     sim_sessions_t sessions = {0};
-    FILE *problems = NULL;
+    logs_t logs = {NULL, NULL};
+    sim_link_t *link = NULL;
     int code = SIM_EXIT_INPUT;
     if (sim_sessions_load(&sessions, options->sessions_file, station->connector_count) &&
         sim_limits_choose(&limits, options->limit_file, options->limit_kw,
                           station->groups[0].limit_W / 1000.0) &&
         (options->price_file == NULL || sim_prices_load(&prices, options->price_file)) &&
-        (options->out == NULL || sim_output_check(options->out)) && open_problems(options, &problems)) {
+        (options->out == NULL || sim_output_check(options->out)) &&
+        open_log(&logs.problems, options->problems_file) && open_log(&logs.frames, options->frames_file) &&
+        open_link(options, &link)) {
         note_missing_planner(options);
         const sim_case_t run = {.station = station,
                                 .solver = taper_setup_solver(options->station),
                                 .policy = options->policy,
+                                .iterations = options->iterations > 0
+                                                  ? options->iterations
+                                                  : taper_setup_iterations(station->tick_ms),
                                 .sessions = &sessions,
                                 .limits = &limits,
                                 .prices = options->price_file == NULL ? NULL : &prices,
                                 .seed = options->seed,
-                                .problems = problems};
+                                .link = link,
+                                .problems = logs.problems,
+                                .frames = logs.frames};
         code = run_case(options, &run);
-        if (!close_problems(options, problems)) {
-            code = SIM_EXIT_INPUT;
-        }
+        link->calls->close(link);
+    }
+    if (!close_logs(options, &logs)) {
+        code = SIM_EXIT_INPUT;
     }
     sim_sessions_free(&sessions);
     sim_course_free(&limits);

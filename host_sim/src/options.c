@@ -12,6 +12,10 @@
 
 #define LONGEST_TICK_S  3600
 #define DEFAULT_STATION "garage"
+/** A whole solve of the largest station takes an emulator on a busy machine some seconds. */
+#define BUS_TIMEOUT_S     60
+#define LONGEST_TIMEOUT_S 3600
+static const char bus_prefix[] = "slcan:";
 
 static const char description[] =
     "Replay charging sessions through the Taper firmware and a simulated fleet, in virtual time; or replay "
@@ -34,6 +38,16 @@ static const char description[] =
     "OUTPUT in DIR: summary.json, sessions.csv, steps.csv, connectors.csv. Equal runs give equal bytes, "
     "except for solve_ms in summary.json, which is wall time. A session that is plugged in at the first tick "
     "after its arrival has queued for 0 s.\n"
+    "\n"
+    "BOARD: with --bus the station is not part of this program, but runs on a board, or an emulated one, "
+    "that obeys "
+    "taper/drive.h. It gets frames and time from here; the same run without --bus, in a build with the "
+    "board's "
+    "floating-point type, gives the same bytes in all files of DIR and in that of --frames. Only "
+    "summary.json "
+    "differs: solve_ms is null there, and board tells what was measured. The board decides about the "
+    "policies "
+    "that it has: not equal-share. It has one bus, and no --problems.\n"
     "\n"
     "RECORDED BUS: --replay-log FILE feeds what taper-station --record FILE wrote to a fresh station, and "
     "compares all that it sends with the recording, bit by bit. FILE.station, which was written with it, "
@@ -59,12 +73,15 @@ enum {
     KEY_SEED,
     KEY_OUT,
     KEY_PROBLEMS,
+    KEY_FRAMES,
+    KEY_BUS,
+    KEY_BUS_TIMEOUT,
+    KEY_ITERATIONS,
     KEY_REPLAY_LOG, // the first that only a replay knows
     KEY_CAN,
     KEY_FAILSAFE,
     KEY_TICK_MS,
     KEY_TIME_SCALE,
-    KEY_ITERATIONS,
     KEY_NO_PLANNER, // the last of them
 };
 
@@ -79,15 +96,28 @@ static const struct argp_option options[] = {
     {"price-weight", KEY_PRICE_WEIGHT, "W", 0,
      "Weight of the price against having energy early, 0..1 (default: the station's own)", 0},
     {"tick-s", KEY_TICK, "N", 0, "Control tick [s], 1..3600 (default: 60)", 0},
+    {"iterations", KEY_ITERATIONS, "N", 0,
+     "Solver iterations in a tick, 1..500; fewer than 10 bound its work (default: 500 in ticks of 10 s or "
+     "more, else 50); in a replay, as "
+     "taper-station was told",
+     0},
     {"min-current-a", KEY_MINIMUM, "X", 0,
      "Least current per phase [A] of every connector; 0: any (default: the station's own)", 0},
     {"seed", KEY_SEED, "N", 0, "Decides in which order nodes send; no result depends on it (default: 0)", 0},
     {"problems", KEY_PROBLEMS, "FILE", 0,
      "Write every planning problem to this file (input of planner_probe)", 0},
+    {"frames", KEY_FRAMES, "FILE", 0, "Write every frame that the station sends to this file (candump -l)",
+     0},
+    {"bus", KEY_BUS, "slcan:HOST:PORT", 0,
+     "Drive the station on a board, which is attached there by SLCAN over TCP (see below)", 0},
+    {"bus-timeout-s", KEY_BUS_TIMEOUT, "N", 0,
+     "Give a board up that says nothing for so long [s] (default: 60)", 0},
     {"out", KEY_OUT, "DIR", 0,
      "Write the results to this directory, made if missing (default: only print a summary)", 0},
     {NULL, 0, NULL, 0,
-     "Replay of a recorded bus. If FILE.station does not tell them, with --station, --limit-kw and:", 1},
+     "Replay of a recorded bus. If FILE.station does not tell them, with --station, --limit-kw, --iterations "
+     "and:",
+     1},
     {"replay-log", KEY_REPLAY_LOG, "FILE", 0, "Recording of taper-station or of candump -l (see below)", 1},
     {"can", KEY_CAN, "IFACE", 0,
      "Interface in the recording; once for each bus, bus 0 first (default: as recorded, or in order of "
@@ -96,7 +126,6 @@ static const struct argp_option options[] = {
     {"failsafe-kw", KEY_FAILSAFE, "X", 0, "As taper-station was told", 1},
     {"tick-ms", KEY_TICK_MS, "N", 0, "As taper-station was told", 1},
     {"time-scale", KEY_TIME_SCALE, "S", 0, "As taper-station was told", 1},
-    {"iterations", KEY_ITERATIONS, "N", 0, "As taper-station was told", 1},
     {"no-planner", KEY_NO_PLANNER, NULL, 0, "As taper-station was told", 1},
     {0},
 };
@@ -147,13 +176,13 @@ static const char *name_of(int key) {
     return option->name;
 }
 
-/** Both kinds of run know --station and --limit-kw. */
+/** Both kinds of run know these. */
 static bool is_of_both(int key) {
-    return key == KEY_STATION || key == KEY_LIMIT;
+    return key == KEY_STATION || key == KEY_LIMIT || key == KEY_ITERATIONS;
 }
 
 static bool is_of_replay(int key) {
-    return key >= KEY_REPLAY_LOG && key <= KEY_NO_PLANNER;
+    return key >= KEY_REPLAY_LOG && key <= KEY_NO_PLANNER && !is_of_both(key);
 }
 
 /** Remember one option of either kind, to refuse what makes no sense together. */
@@ -164,6 +193,21 @@ static void note_option(sim_options_t *chosen, int key) {
         chosen->run_option = name_of(key);
     }
     chosen->replay.station_given = chosen->replay.station_given || key == KEY_STATION;
+}
+
+/** What a board cannot do. */
+static void check_bus(const sim_options_t *chosen, struct argp_state *state) {
+    const taper_station_config_t *station = taper_stations[chosen->station];
+    if (chosen->problems_file != NULL) {
+        argp_error(state, "--problems and --bus exclude each other: the problems stay on the board");
+    }
+    if (chosen->policy->on_board < 0) {
+        argp_error(state, "--policy %s: a board (--bus) does not have it", chosen->policy->name);
+    }
+    if (taper_setup_buses(station) > 1) {
+        argp_error(state, "--bus: station %s has %u CAN buses, and SLCAN carries one", station->name,
+                   taper_setup_buses(station));
+    }
 }
 
 /** What can only be checked when all options are known. */
@@ -189,6 +233,11 @@ static void check_run(const sim_options_t *chosen, struct argp_state *state) {
         argp_error(state, "--min-current-a: above %g A, the most that a connector of this station gives",
                    most_A);
     }
+    if (chosen->bus != NULL) {
+        check_bus(chosen, state);
+    } else if (chosen->bus_timeout_s > 0) {
+        argp_error(state, "--bus-timeout-s needs --bus");
+    }
 }
 
 static void check(sim_options_t *chosen, struct argp_state *state) {
@@ -198,9 +247,20 @@ static void check(sim_options_t *chosen, struct argp_state *state) {
     }
     chosen->replay.setup.station = chosen->station;
     chosen->replay.setup.limit_kw = chosen->limit_kw;
+    chosen->replay.setup.iterations = chosen->iterations;
     if (chosen->run_option != NULL) {
         argp_error(state, "--%s and --replay-log exclude each other", chosen->run_option);
     }
+}
+
+static void set_bus(sim_options_t *chosen, const char *text, struct argp_state *state) {
+    const size_t prefix = sizeof bus_prefix - 1;
+    const char *colon = strrchr(text, ':');
+    if (strncmp(text, bus_prefix, prefix) != 0 || colon <= text + prefix || colon[1] == '\0') {
+        argp_error(state, "--bus: must be slcan:HOST:PORT: '%s'", text);
+        return;
+    }
+    chosen->bus = text + prefix;
 }
 
 static void add_interface(sim_replay_options_t *replay, const char *name, struct argp_state *state) {
@@ -229,10 +289,24 @@ static bool parse_replay(int key, const char *text, sim_replay_options_t *replay
     case KEY_TIME_SCALE:
         setup->time_scale = whole("--time-scale", text, 1, TAPER_MAX_TIME_SCALE, state);
         break;
-    case KEY_ITERATIONS:
-        setup->iterations = whole("--iterations", text, TAPER_MIN_SLICE, TAPER_MAX_ITERATIONS, state);
-        break;
     case KEY_NO_PLANNER: setup->no_planner = true; break;
+    default: return false;
+    }
+    return true;
+}
+
+/** The options of --bus, of what goes beside the results, and --iterations. @return whether `key` is one. */
+static bool parse_bus(int key, const char *text, sim_options_t *chosen, struct argp_state *state) {
+    switch (key) {
+    case KEY_PROBLEMS: chosen->problems_file = text; break;
+    case KEY_FRAMES: chosen->frames_file = text; break;
+    case KEY_BUS: set_bus(chosen, text, state); break;
+    case KEY_BUS_TIMEOUT:
+        chosen->bus_timeout_s = whole("--bus-timeout-s", text, 1, LONGEST_TIMEOUT_S, state);
+        break;
+    case KEY_ITERATIONS:
+        chosen->iterations = whole("--iterations", text, 1, TAPER_MAX_ITERATIONS, state);
+        break;
     default: return false;
     }
     return true;
@@ -257,10 +331,12 @@ static error_t parse(int key, char *text, struct argp_state *state) {
         break;
     case KEY_SEED: chosen->seed = taper_argument_whole("--seed", text, 0, UINT64_MAX, state); break;
     case KEY_OUT: chosen->out = text; break;
-    case KEY_PROBLEMS: chosen->problems_file = text; break;
     case ARGP_KEY_ARG: argp_error(state, "unexpected argument '%s'", text); break;
     case ARGP_KEY_END: check(chosen, state); break;
-    default: return parse_replay(key, text, &chosen->replay, state) ? 0 : ARGP_ERR_UNKNOWN;
+    default:
+        return parse_bus(key, text, chosen, state) || parse_replay(key, text, &chosen->replay, state)
+                   ? 0
+                   : ARGP_ERR_UNKNOWN;
     }
     return 0;
 }
@@ -290,6 +366,9 @@ sim_options_t sim_options_parse(int argc, char **argv) {
     // Every error of ours ends the program inside; what is left is memory that argp could not get.
     if (argp_parse(&parser, argc, argv, 0, NULL, &chosen) != 0) {
         exit(SIM_EXIT_USAGE);
+    }
+    if (chosen.bus_timeout_s == 0) {
+        chosen.bus_timeout_s = BUS_TIMEOUT_S;
     }
     return chosen;
 }

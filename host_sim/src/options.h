@@ -17,12 +17,16 @@ typedef struct {
     const char *price_file;    /**< NULL: none */
     const char *out;           /**< NULL: no files */
     const char *problems_file; /**< NULL: none */
+    const char *frames_file;   /**< NULL: none */
+    const char *bus;           /**< HOST:PORT of the board; NULL: the station is part of the program */
+    unsigned bus_timeout_s;
     const sim_policy_t *policy;
     unsigned station;     /**< index in taper_stations[] */
     double limit_kw;      /**< negative: not given */
     double min_current_A; /**< negative: the station's own */
     double price_weight;  /**< 0..1; negative: the station's own */
     uint32_t tick_s;
+    uint16_t iterations; /**< of the solver in a tick; 0: as the tick has room */
     uint64_t seed;
     sim_replay_options_t replay; /**< its file is NULL: no replay, a run */
     const char *run_option;      /**< an option given that only a run knows, or NULL */

@@ -58,6 +58,7 @@ void sim_results_free(sim_results_t *results) {
     free_text(&results->connectors);
     sim_samples_free(&results->iterations);
     sim_samples_free(&results->solve_ms);
+    sim_work_free(&results->work);
     *results = (sim_results_t){0};
 }
 
@@ -198,6 +199,30 @@ static void add_spread(cJSON *object, const char *name, sim_samples_t *samples, 
     add_fixed(inner, "max", spread.max, decimals);
 }
 
+static void add_known_count(cJSON *object, const char *name, bool known, uint32_t value) {
+    if (known) {
+        add_count(object, name, value);
+    } else {
+        cJSON_AddNullToObject(object, name);
+    }
+}
+
+/** What was measured on the board. */
+static void add_board(cJSON *object, sim_results_t *results) {
+    sim_work_t *work = &results->work;
+    const sim_hardware_t *hardware = &results->hardware;
+    const bool counted = work->ticks.count > 0;
+    const bool has_stack = hardware->stack_size_B > 0;
+    cJSON *board = cJSON_AddObjectToObject(object, "board");
+    cJSON *per_tick = cJSON_AddObjectToObject(board, "instructions_per_tick");
+    add_known_count(per_tick, "p50", counted, (uint32_t)sim_samples_spread(&work->ticks).p50);
+    add_known_count(per_tick, "max", counted, work->worst);
+    add_known_count(per_tick, "max_without_slice", counted, work->worst_without_slice);
+    add_known_count(board, "max_instructions_per_poll", counted, work->worst_poll);
+    add_known_count(board, "stack_used_b", has_stack, hardware->stack_used_B);
+    add_known_count(board, "stack_size_b", has_stack, hardware->stack_size_B);
+}
+
 /** The text of summary.json; NULL without memory. To be freed with cJSON_free(). */
 static char *summary_json(sim_results_t *results) {
     const totals_t totals = sum_up(results);
@@ -212,7 +237,11 @@ static char *summary_json(sim_results_t *results) {
     add_count(object, "fallback_ticks", results->fallback_ticks);
     add_count(object, "solves", results->solves);
     add_spread(object, "iterations", &results->iterations, 0);
-    add_spread(object, "solve_ms", &results->solve_ms, 3);
+    if (results->hardware.known) {
+        cJSON_AddNullToObject(object, "solve_ms");
+    } else {
+        add_spread(object, "solve_ms", &results->solve_ms, 3);
+    }
     add_fixed(object, "peak_kw", results->peak_kw, 4);
     add_count(object, "tick_s", (uint64_t)results->tick_s);
     add_given(object, "min_current_a", results->min_current_A >= 0.0, results->min_current_A, 3);
@@ -224,6 +253,9 @@ static char *summary_json(sim_results_t *results) {
     add_given(object, "energy_cost", results->priced, results->cost, 4);
     add_given(object, "cost_per_kwh", per_kwh, per_kwh ? results->cost / totals.delivered_kwh : 0.0, 5);
     add_given(object, "price_weight", results->price_weight >= 0.0, results->price_weight, 3);
+    if (results->hardware.known) {
+        add_board(object, results);
+    }
     char *text = cJSON_Print(object);
     cJSON_Delete(object);
     return text;
@@ -252,6 +284,35 @@ bool sim_results_write(sim_results_t *results, const char *directory) {
     return written;
 }
 
+static void print_solves(sim_results_t *results, FILE *stream) {
+    const sim_spread_t iterations = sim_samples_spread(&results->iterations);
+    const sim_spread_t solve_ms = sim_samples_spread(&results->solve_ms);
+    if (results->solves == 0) {
+        return;
+    }
+    fprintf(stream, "%" PRIu32 " solves: iterations p50 %.0f, p99 %.0f, max %.0f", results->solves,
+            iterations.p50, iterations.p99, iterations.max);
+    if (!results->hardware.known) {
+        fprintf(stream, "; ms p50 %.2f, p99 %.2f, max %.2f", solve_ms.p50, solve_ms.p99, solve_ms.max);
+    }
+    fputc('\n', stream);
+}
+
+static void print_board(sim_results_t *results, FILE *stream) {
+    sim_work_t *work = &results->work;
+    if (work->ticks.count > 0) {
+        fprintf(stream,
+                "board: instructions per tick p50 %.0f, max %" PRIu32 ", max without a solver slice %" PRIu32
+                "; per poll max %" PRIu32 "\n",
+                sim_samples_spread(&work->ticks).p50, work->worst, work->worst_without_slice,
+                work->worst_poll);
+    }
+    if (results->hardware.stack_size_B > 0) {
+        fprintf(stream, "board: stack %" PRIu32 " of %" PRIu32 " bytes used\n",
+                results->hardware.stack_used_B, results->hardware.stack_size_B);
+    }
+}
+
 void sim_results_print(sim_results_t *results, FILE *stream) {
     const totals_t totals = sum_up(results);
     const double share =
@@ -267,13 +328,6 @@ void sim_results_print(sim_results_t *results, FILE *stream) {
         fprintf(stream, "the energy cost %.2f, %.4f per kWh delivered\n", results->cost,
                 totals.delivered_kwh > 0.0 ? results->cost / totals.delivered_kwh : 0.0);
     }
-    if (results->solves > 0) {
-        const sim_spread_t iterations = sim_samples_spread(&results->iterations);
-        const sim_spread_t solve_ms = sim_samples_spread(&results->solve_ms);
-        fprintf(stream,
-                "%" PRIu32
-                " solves: iterations p50 %.0f, p99 %.0f, max %.0f; ms p50 %.2f, p99 %.2f, max %.2f\n",
-                results->solves, iterations.p50, iterations.p99, iterations.max, solve_ms.p50, solve_ms.p99,
-                solve_ms.max);
-    }
+    print_solves(results, stream);
+    print_board(results, stream);
 }

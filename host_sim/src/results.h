@@ -2,7 +2,7 @@
  * What a run delivered, and its files.
  *
  * Numbers are written with a fixed count of decimals, so that equal runs give equal bytes; the one exception is
- * solve_ms in summary.json, which is wall time.
+ * solve_ms in summary.json, which is wall time. On a board nobody knows that: it is null, and `board` tells what was measured.
  */
 #ifndef SIM_RESULTS_H
 #define SIM_RESULTS_H
@@ -14,9 +14,11 @@
 
 #include "evse.h"
 #include "sessions.h"
+#include "station_link.h"
 #include "stats.h"
 #include "taper/bus.h"
 #include "taper/message.h"
+#include "work.h"
 
 /** What became of one session. */
 typedef struct {
@@ -54,6 +56,8 @@ typedef struct {
     uint32_t fallback_ticks;
     uint32_t solves;
     uint32_t guard_violations;
+    sim_hardware_t hardware; /**< not known: the station was part of this program */
+    sim_work_t work;
 } sim_results_t;
 
 /** Begin. With `records`, what sim_results_write() needs of every tick is kept. End with sim_results_free(). */

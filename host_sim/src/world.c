@@ -7,13 +7,12 @@
 #include "account.h"
 #include "curve.h"
 #include "fleet.h"
+#include "frames_log.h"
 #include "gateway.h"
 #include "memory.h"
 #include "problems.h"
 #include "progress.h"
 #include "queue.h"
-#include "setup.h"
-#include "taper/membus.h"
 
 /** Connectors echo their first setpoints this long after the tick began [ms]. */
 #define ECHO_ms TAPER_EVSE_STATUS_CYCLE_ms
@@ -33,12 +32,9 @@ typedef struct {
     const sim_case_t *run;
     sim_results_t *results;
     int64_t tick_s;
-    taper_membus_t bus;
-    taper_port_t port;       /**< the station's end of the bus */
-    taper_port_t world_port; /**< the other end */
-    uint32_t tick_ms;        /**< context of the policy */
-    taper_policy_t policy;
-    taper_station_t station;
+    sim_link_t *link; /**< the station */
+    sim_frames_log_t log;
+    taper_port_t port; /**< the world's end of the bus */
     sim_fleet_t fleet;
     sim_gateway_t gateway;
     sim_curve_t curve;
@@ -60,27 +56,44 @@ static uint64_t next_random(world_t *world) {
     return z ^ (z >> 31);
 }
 
-static uint32_t clock_us(void *context) {
-    (void)context;
-    return (uint32_t)sim_now_us();
+static void set_time(world_t *world, uint64_t now_ms) {
+    world->log.time_ms = now_ms;
+    world->link->calls->set_time(world->link, (uint32_t)now_ms);
 }
 
 /** @return whether the station takes its description and options. */
-static bool init_station(world_t *world) {
+static bool start_station(const world_t *world) {
     const sim_case_t *run = world->run;
-    world->port = taper_membus_station_port(&world->bus);
-    world->port.clock_us = clock_us;
-    world->tick_ms = run->station->tick_ms;
-    world->policy = (taper_policy_t){.propose = run->policy->propose, .context = &world->tick_ms};
-    const bool plans = run->policy->propose == NULL;
-    const taper_station_options_t options = {
+    const sim_station_setup_t setup = {
         .config = run->station,
-        .port = &world->port,
-        .solver = plans ? run->solver : NULL,
-        .policy = plans ? NULL : &world->policy,
-        .iterations_per_tick = taper_setup_iterations(run->station->tick_ms),
+        .solver = run->solver,
+        .policy = run->policy,
+        .iterations_per_tick = run->iterations,
     };
-    return taper_station_init(&world->station, &options) == TAPER_OK;
+    return world->link->calls->start(world->link, &setup);
+}
+
+static bool step(world_t *world, uint32_t now_ms) {
+    const bool good = world->link->calls->step(world->link, now_ms);
+    sim_work_add(&world->results->work, SIM_STEP, world->link->state.planned,
+                 world->link->state.instructions);
+    return good;
+}
+
+static bool poll(world_t *world, uint32_t now_ms) {
+    const bool good = world->link->calls->poll(world->link, now_ms);
+    sim_work_add(&world->results->work, SIM_POLL, false, world->link->state.instructions);
+    return good;
+}
+
+/** @return false, after one line: the world has sent more than the station's queue holds. */
+static bool has_room(const world_t *world, bool sent) {
+    if (sent && !world->link->calls->is_overrun(world->link)) {
+        return true;
+    }
+    fprintf(stderr, "taper-sim: internal error at %llu s: the bus refused what was sent to the station\n",
+            (unsigned long long)(world->log.time_ms / 1000u));
+    return false;
 }
 
 /** Every node sends what it has to say, in an order that the seed decides anew for each tick. */
@@ -96,23 +109,29 @@ static bool send_reports(world_t *world, int64_t now_s) {
                                            : sim_fleet_report(&world->fleet, node);
         sent = sent && ok;
     }
-    return sent && world->bus.to_station.overflows == 0;
+    return has_room(world, sent);
 }
 
 /** Take note of a solve that the station finished in this tick. */
-static void note_solve(world_t *world) {
-    const taper_station_t *station = &world->station;
-    const uint32_t plans = taper_station_counter(station, TAPER_COUNTER_PLANS);
-    if (plans == world->plans) {
-        return;
+static bool note_solve(world_t *world) {
+    const taper_station_t *station = world->link->station;
+    sim_solve_t solve = {0};
+    if (world->link->state.plans == world->plans) {
+        return true;
     }
-    world->plans = plans;
-    sim_samples_add(&world->results->iterations, taper_planner_iterations(&station->planner));
-    sim_samples_add(&world->results->solve_ms, station->last_solve_us / 1000.0);
+    world->plans = world->link->state.plans;
+    if (!world->link->calls->solve(world->link, &solve)) {
+        return false;
+    }
+    sim_samples_add(&world->results->iterations, solve.iterations);
+    if (solve.solve_ms >= 0.0) {
+        sim_samples_add(&world->results->solve_ms, solve.solve_ms);
+    }
     if (world->run->problems != NULL &&
         station->plan_made_ms == station->snapshot.now_ms) { // else: older snapshot
         sim_problems_add(world->run->problems, station);
     }
+    return true;
 }
 
 /** All report again at `passed_ms` into the tick. In every second round the vehicles and the gateway do so too. */
@@ -121,8 +140,8 @@ static bool repeat_reports(world_t *world, int64_t now_s, uint32_t passed_ms, bo
     for (unsigned i = 0; i < world->run->station->connector_count; i++) {
         sent = sim_fleet_echo(&world->fleet, i, whole) && sent;
     }
-    return (!whole || sim_gateway_repeat(&world->gateway, now_s, (double)passed_ms / 1000.0)) && sent &&
-           world->bus.to_station.overflows == 0;
+    sent = (!whole || sim_gateway_repeat(&world->gateway, now_s, (double)passed_ms / 1000.0)) && sent;
+    return has_room(world, sent);
 }
 
 /** The time of the next round of a hand-over. One of them is that at which the slowest vehicle has just reacted. */
@@ -139,14 +158,15 @@ static uint32_t next_round_ms(const world_t *world, uint32_t passed_ms) {
 
 /** Time passes up to `passed_ms` into the tick; echoes in, setpoints out. */
 static bool run_round(world_t *world, int64_t now_s, uint32_t passed_ms, bool whole) {
-    const uint32_t now_ms = (uint32_t)((uint64_t)now_s * 1000U) + passed_ms;
+    const uint64_t now_ms = (uint64_t)now_s * 1000U + passed_ms;
     sim_account_pass(&world->account, (double)now_s + (double)passed_ms / 1000.0);
-    taper_membus_set_time(&world->bus, now_ms);
-    const bool sent = repeat_reports(world, now_s, passed_ms, whole);
-    taper_station_poll(&world->station, now_ms);
+    set_time(world, now_ms);
+    if (!repeat_reports(world, now_s, passed_ms, whole) || !poll(world, (uint32_t)now_ms)) {
+        return false;
+    }
     sim_fleet_hear(&world->fleet);
     sim_account_obey(&world->account);
-    return sent;
+    return true;
 }
 
 /**
@@ -159,8 +179,7 @@ static bool hand_over(world_t *world, int64_t now_s) {
     uint32_t passed_ms = next_round_ms(world, 0);
     bool sent = true;
     for (unsigned round = 1;
-         sent && passed_ms <= end_ms && passed_ms < tick_ms && !taper_station_is_settled(&world->station);
-         round++) {
+         sent && passed_ms <= end_ms && passed_ms < tick_ms && !world->link->state.is_settled; round++) {
         const bool whole = round % 2 == 0 || passed_ms > world->reaction_ms + PATIENCE_ms;
         sent = run_round(world, now_s, passed_ms, whole);
         passed_ms = next_round_ms(world, passed_ms);
@@ -174,7 +193,7 @@ static bool hand_over(world_t *world, int64_t now_s) {
 /** Frames go to the gateway, or to their connectors. */
 static void pass_on_frames(world_t *world) {
     taper_frame_t frame;
-    while (taper_membus_world_receive(&world->bus, &frame)) {
+    while (world->port.receive(world->port.context, &frame)) {
         if (!sim_curve_take(&world->curve, &frame, world->curve_ms)) {
             sim_fleet_take(&world->fleet, &frame);
         }
@@ -192,20 +211,20 @@ static bool tell_curve(world_t *world, int64_t now_s, uint32_t now_ms) {
          round++) {
         world->curve_ms++;
         if (sim_curve_next(&world->curve, (double)now_s, world->curve_ms, &frame) &&
-            taper_membus_world_send(&world->bus, &frame)) {
+            world->port.send(world->port.context, &frame)) {
             sim_curve_sent(&world->curve, world->curve_ms);
-            taper_station_poll(&world->station, now_ms); // it never speaks unless it is spoken to
+            if (!poll(world, now_ms)) { // the station never speaks unless it is spoken to
+                return false;
+            }
             pass_on_frames(world);
         }
     }
-    return sim_curve_is_settled(&world->curve, (double)now_s);
-}
-
-/** @return false */
-static bool bus_failed(int64_t now_s) {
-    fprintf(stderr, "taper-sim: internal error at %lld s: the station or the bus refused what it was sent\n",
-            (long long)now_s);
-    return false;
+    if (!sim_curve_is_settled(&world->curve, (double)now_s)) {
+        fprintf(stderr, "taper-sim: internal error at %lld s: the station does not take a curve\n",
+                (long long)now_s);
+        return false;
+    }
+    return true;
 }
 
 /**
@@ -227,23 +246,33 @@ static bool change_vehicles(world_t *world, int64_t now_s) {
     return sent;
 }
 
-static bool run_tick(world_t *world, int64_t now_s) {
-    const uint32_t now_ms = (uint32_t)((uint64_t)now_s * 1000U);
-    taper_membus_set_time(&world->bus, now_ms);
-    const bool reported = change_vehicles(world, now_s) && send_reports(world, now_s);
-    sim_fleet_begin(&world->fleet, now_s);
-    if (!reported || !tell_curve(world, now_s, now_ms)) {
-        return bus_failed(now_s);
+/** The tick is over: what was drawn in it, and why, as the station tells. */
+static bool end_tick(world_t *world) {
+    taper_outlook_t outlook[TAPER_MAX_CONNECTORS];
+    bool wanted[TAPER_MAX_CONNECTORS] = {false};
+    const bool records = world->results->connectors.stream != NULL;
+    for (unsigned i = 0; i < world->run->station->connector_count; i++) {
+        wanted[i] = world->fleet.evse[i].vehicle != NULL;
     }
-    taper_station_step(&world->station, now_ms);
-    note_solve(world);
+    if (records && !world->link->calls->look(world->link, wanted, outlook)) {
+        return false;
+    }
+    sim_account_end(&world->account, world->link->state.mode, records ? outlook : NULL);
+    return true;
+}
+
+static bool run_tick(world_t *world, int64_t now_s) {
+    const uint64_t now_ms = (uint64_t)now_s * 1000U;
+    set_time(world, now_ms);
+    const bool reported = has_room(world, change_vehicles(world, now_s)) && send_reports(world, now_s);
+    sim_fleet_begin(&world->fleet, now_s);
+    if (!reported || !tell_curve(world, now_s, (uint32_t)now_ms) || !step(world, (uint32_t)now_ms) ||
+        !note_solve(world)) {
+        return false;
+    }
     sim_fleet_hear(&world->fleet);
     sim_account_begin(&world->account, now_s, sim_gateway_limit_kw(&world->gateway, now_s));
-    if (!hand_over(world, now_s)) {
-        return bus_failed(now_s);
-    }
-    sim_account_end(&world->account, &world->station);
-    return true;
+    return hand_over(world, now_s) && end_tick(world);
 }
 
 static bool run_ticks(world_t *world) {
@@ -267,42 +296,48 @@ static bool run_ticks(world_t *world) {
     return good;
 }
 
-bool sim_world_run(const sim_case_t *run, sim_results_t *results) {
+static world_t *new_world(const sim_case_t *run, sim_results_t *results) {
+    const taper_station_config_t *station = run->station;
     world_t *world = sim_allocate(1, sizeof *world);
     world->run = run;
     world->results = results;
-    world->tick_s = run->station->tick_ms / 1000;
+    world->link = run->link;
+    world->port = sim_frames_log_port(&world->log, &run->link->port, run->frames);
+    world->tick_s = station->tick_ms / 1000;
     world->random = run->seed;
-    for (unsigned i = 0; i <= run->station->connector_count; i++) {
+    for (unsigned i = 0; i <= station->connector_count; i++) {
         world->turn[i] = (uint8_t)i;
     }
-    for (unsigned i = 0; i < run->station->connector_count; i++) {
-        const uint32_t reaction_ms = run->station->connectors[i].reaction_ms;
+    for (unsigned i = 0; i < station->connector_count; i++) {
+        const uint32_t reaction_ms = station->connectors[i].reaction_ms;
         world->reaction_ms = reaction_ms > world->reaction_ms ? reaction_ms : world->reaction_ms;
     }
-    taper_membus_init(&world->bus);
-    world->world_port = taper_membus_world_port(&world->bus);
-    sim_fleet_init(&world->fleet, run->station, &world->world_port, run->policy->tells_taper, run->seed);
-    sim_gateway_init(&world->gateway, run->limits, &world->world_port, world->tick_s, run->seed);
+    sim_fleet_init(&world->fleet, station, &world->port, run->policy->tells_taper, run->seed);
+    sim_gateway_init(&world->gateway, run->limits, &world->port, world->tick_s, run->seed);
     sim_curve_init(&world->curve, run->limits);
     sim_curve_set_prices(&world->curve, run->prices);
-    sim_queue_init(&world->queue, run->sessions, world->fleet.evse, run->station->connector_count,
+    sim_queue_init(&world->queue, run->sessions, world->fleet.evse, station->connector_count,
                    results->outcome);
     world->account = (sim_account_t){.fleet = &world->fleet, .prices = run->prices, .results = results};
-    bool good = init_station(world);
-    if (good) {
-        if (run->problems != NULL) {
-            sim_problems_begin(run->problems, &world->station);
-        }
-        good = run_ticks(world);
-    } else {
-        fprintf(stderr, "taper-sim: the firmware refuses station %s with these options\n",
-                run->station->name);
+    return world;
+}
+
+/** What the station has counted in the whole run, and what the hardware tells. */
+static bool ask_at_the_end(sim_link_t *link, sim_results_t *results) {
+    return link->calls->counter(link, TAPER_COUNTER_PLANS, &results->solves) &&
+           link->calls->counter(link, TAPER_COUNTER_FALLBACK_TICKS, &results->fallback_ticks) &&
+           link->calls->counter(link, TAPER_COUNTER_GUARD_VIOLATIONS, &results->guard_violations) &&
+           link->calls->hardware(link, &results->hardware);
+}
+
+bool sim_world_run(const sim_case_t *run, sim_results_t *results) {
+    world_t *world = new_world(run, results);
+    bool good = start_station(world);
+    if (good && run->problems != NULL) {
+        sim_problems_begin(run->problems, world->link->station);
     }
+    good = good && run_ticks(world) && ask_at_the_end(world->link, results);
     sim_queue_finish(&world->queue);
-    results->solves = taper_station_counter(&world->station, TAPER_COUNTER_PLANS);
-    results->fallback_ticks = taper_station_counter(&world->station, TAPER_COUNTER_FALLBACK_TICKS);
-    results->guard_violations = taper_station_counter(&world->station, TAPER_COUNTER_GUARD_VIOLATIONS);
     sim_queue_free(&world->queue);
     free(world);
     return good;

@@ -37,6 +37,7 @@ static void solve(OSQPSolver *solver, OSQPFloat *a, OSQPInt a_count, OSQPFloat *
     for (OSQPInt k = 0; k < variables; k++) {
         linear[k] = (OSQPFloat)-0.05;
     }
+    (void)osqp_update_rho(solver, (OSQPFloat)0.3); /* its factorisation fails: there are no values yet */
     require(osqp_update_data_mat(solver, p, NULL, p_count, a, NULL, a_count) == 0, "matrices");
     require(osqp_update_data_vec(solver, linear, low, high) == 0, "vectors");
     osqp_cold_start(solver);
@@ -57,11 +58,12 @@ static void solve_and_print(OSQPSolver *solver, OSQPFloat *a, OSQPInt a_count, O
 }
 
 #define COUNT(array) ((OSQPInt)(sizeof(array) / sizeof((array)[0])))
+#define SOLVE_AND_PRINT(workspace)                                                                  \
+    solve_and_print(&workspace##_solver, workspace##_data_A_csc_x, COUNT(workspace##_data_A_csc_x), \
+                    workspace##_data_P_csc_x, COUNT(workspace##_data_P_csc_x))
 
 int main(void) {
-    solve_and_print(&hub_solver, hub_data_A_csc_x, COUNT(hub_data_A_csc_x), hub_data_P_csc_x,
-                    COUNT(hub_data_P_csc_x));
-    solve_and_print(&garage_solver, garage_data_A_csc_x, COUNT(garage_data_A_csc_x), garage_data_P_csc_x,
-                    COUNT(garage_data_P_csc_x));
+    SOLVE_AND_PRINT(taper_workspace_hub);
+    SOLVE_AND_PRINT(taper_workspace_garage);
     return 0;
 }

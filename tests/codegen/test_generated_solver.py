@@ -42,9 +42,9 @@ def numbers_of(text: str, array: str) -> list[float]:
 @pytest.mark.parametrize("name", STATIONS)
 def test_index_arrays_are_constant_and_all_else_is_not(tree: Path, name: str) -> None:
     text = (tree / f"solver/{name}_workspace.c").read_text()
-    constant = set(re.findall(rf"^static const OSQPInt {name}_(\w+)\[", text, re.MULTILINE))
+    constant = set(re.findall(rf"^static const OSQPInt taper_workspace_{name}_(\w+)\[", text, re.MULTILINE))
     assert constant == set(workspace.CONSTANT)
-    written = re.findall(rf"^(?:static )?OSQPInt {name}_(\w+)\[", text, re.MULTILINE)
+    written = re.findall(rf"^(?:static )?OSQPInt taper_workspace_{name}_(\w+)\[", text, re.MULTILINE)
     assert written == ["linsys_iwork", "linsys_bwork", "work_constr_type_val"]
     assert "const OSQPFloat" not in text
 
@@ -55,10 +55,10 @@ def test_values_are_exact(tree: Path, real: str, name: str) -> None:
     station = read_station(CODEGEN / f"stations/{name}.toml")
     kind = np.float64 if real == "double" else np.float32
     for array, matrix in (("A", qp.constraint_matrix(station)), ("P", qp.cost_matrix(station))):
-        written = np.array(numbers_of(text, f"{name}_data_{array}_csc_x")).astype(kind)
+        written = np.array(numbers_of(text, f"taper_workspace_{name}_data_{array}_csc_x")).astype(kind)
         assert (written == matrix.data.astype(kind)).all()
-        assert numbers_of(text, f"{name}_data_{array}_csc_i") == matrix.indices.tolist()
-        assert numbers_of(text, f"{name}_data_{array}_csc_p") == matrix.indptr.tolist()
+        assert numbers_of(text, f"taper_workspace_{name}_data_{array}_csc_i") == matrix.indices.tolist()
+        assert numbers_of(text, f"taper_workspace_{name}_data_{array}_csc_p") == matrix.indptr.tolist()
     assert "1e-06" in text  # sigma, which OSQP prints with 20 decimals
 
 
@@ -72,14 +72,14 @@ def test_a_number_reads_back_as_itself(value: float) -> None:
 
 
 @pytest.mark.parametrize("name", STATIONS)
-def test_it_compiles_without_warnings_and_every_symbol_has_the_station_s_name(
+def test_it_compiles_without_warnings_and_every_symbol_is_prefixed_and_has_the_station_s_name(
     tree: Path, tmp_path: Path, name: str
 ) -> None:
     compiled = tmp_path / "workspace.o"
     compile_c([tree / f"solver/{name}_workspace.c"], includes(tree), compiled, "-c")
     symbols = subprocess.run(["nm", "-g", "--defined-only", compiled], capture_output=True, text=True, check=True)
     names = {line.split()[2] for line in symbols.stdout.splitlines()}
-    assert names == {f"{name}_solver", f"{name}_data_A_csc_x", f"{name}_data_P_csc_x"}
+    assert names == {f"taper_workspace_{name}_{part}" for part in ("solver", "data_A_csc_x", "data_P_csc_x")}
 
 
 def test_the_descriptions_of_the_solvers_compile_with_the_planner_s_headers(tree: Path, tmp_path: Path) -> None:

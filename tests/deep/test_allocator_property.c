@@ -6,7 +6,9 @@
 #include "tree.h"
 #include "unity.h"
 
-#define SLACK 1e-6
+#define SLACK     1e-6
+#define PROPOSALS (100000u / TEST_SHARE)
+#define GUARDED   (30000u / TEST_SHARE)
 
 static tree_t tree;
 static uint32_t state;
@@ -183,7 +185,7 @@ static bool assert_connectors_hold(void) {
 
 static void test_limits_hold_for_a_hundred_thousand_hostile_proposals_on_any_tree(void) {
     unsigned with_current = 0;
-    for (unsigned round = 0; round < 100000; round++) {
+    for (unsigned round = 0; round < PROPOSALS; round++) {
         if (round % 50 == 0) {
             grow_tree();
             for (unsigned left = 1 + below(20); left > 0; left--) {
@@ -200,14 +202,15 @@ static void test_limits_hold_for_a_hundred_thousand_hostile_proposals_on_any_tre
         }
         with_current += assert_connectors_hold() ? 1 : 0;
     }
-    TEST_ASSERT_GREATER_THAN_UINT(30000, with_current); /* one that gives nothing is not safe, it is off */
+    TEST_ASSERT_GREATER_THAN_UINT(PROPOSALS * 3 / 10,
+                                  with_current); /* one that gives nothing is not safe, it is off */
 }
 
 /** Setpoints that nobody bounded: the guard and the phasors agree, but for what rounding decides. */
 static void test_the_guard_agrees_with_phasors_on_any_setpoints(void) {
     unsigned passed = 0;
     unsigned refused = 0;
-    for (unsigned round = 0; round < 30000; round++) {
+    for (unsigned round = 0; round < GUARDED; round++) {
         grow_tree();
         for (unsigned left = 1 + below(6); left > 0; left--) {
             add_connector();
@@ -225,8 +228,8 @@ static void test_the_guard_agrees_with_phasors_on_any_setpoints(void) {
             refused++;
         }
     }
-    TEST_ASSERT_GREATER_THAN_UINT(5000, passed);
-    TEST_ASSERT_GREATER_THAN_UINT(5000, refused);
+    TEST_ASSERT_GREATER_THAN_UINT(GUARDED / 6, passed);
+    TEST_ASSERT_GREATER_THAN_UINT(GUARDED / 6, refused);
 }
 
 int main(void) {

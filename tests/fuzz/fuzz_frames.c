@@ -251,7 +251,7 @@ static void feed_event(const uint8_t *record) {
         start_station();
         break;
     case FUZZ_TEAR_WRITE: taper_membus_tear_next_write(&world.bus, detail); break;
-    default: taper_membus_rot(&world.bus, record[6], detail); break;
+    default: taper_membus_rot(&world.bus, TAPER_STORE_STATION, record[6], 8u * record[7] + detail); break;
     }
 }
 

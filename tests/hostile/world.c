@@ -45,14 +45,14 @@ static void port_restart(void *context, uint8_t bus) {
     world->membus_port.restart_bus(world->membus_port.context, bus);
 }
 
-static bool port_store_read(void *context, unsigned copy, void *data, uint32_t length) {
+static bool port_store_read(void *context, unsigned area, unsigned copy, void *data, uint32_t length) {
     const world_t *world = context;
-    return world->membus_port.store_read(world->membus_port.context, copy, data, length);
+    return world->membus_port.store_read(world->membus_port.context, area, copy, data, length);
 }
 
-static bool port_store_write(void *context, unsigned copy, const void *data, uint32_t length) {
+static bool port_store_write(void *context, unsigned area, unsigned copy, const void *data, uint32_t length) {
     const world_t *world = context;
-    return world->membus_port.store_write(world->membus_port.context, copy, data, length);
+    return world->membus_port.store_write(world->membus_port.context, area, copy, data, length);
 }
 
 static bool start_station(world_t *world) {

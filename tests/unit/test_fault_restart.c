@@ -96,7 +96,7 @@ static void test_row_29_the_store_is_not_worn_out_by_a_limit_that_changes_all_th
 
 static void test_row_30_of_a_torn_record_the_older_copy_is_used(void) {
     set_failsafe(7000);
-    taper_membus_tear_next_write(&live.bus, 7);
+    taper_membus_tear_next_write(&live.bus, 40);
     live_bench_kill_station();
     live_bench_revive_station(); /* it writes the record at its start, and power goes */
     live_bench_kill_station();
@@ -113,8 +113,8 @@ static void test_row_30_of_a_torn_record_the_older_copy_is_used(void) {
 
 static void test_row_30_with_both_copies_bad_the_factorys_failsafe_limit_holds(void) {
     set_failsafe(7000);
-    taper_membus_rot(&live.bus, 0, 40);
-    taper_membus_rot(&live.bus, 1, 3);
+    taper_membus_rot(&live.bus, TAPER_STORE_STATION, 0, 40);
+    taper_membus_rot(&live.bus, TAPER_STORE_STATION, 1, 3);
     live_bench_revive_station();
     live_bench_run_ms(LIVE_POLL_ms);
     TEST_ASSERT_EQUAL_INT32(11000, live.station.limits.failsafe_W);
@@ -127,13 +127,19 @@ static void test_row_30_with_both_copies_bad_the_factorys_failsafe_limit_holds(v
     TEST_ASSERT_EQUAL_UINT(0, fault_events(TAPER_EVENT_STORE_RESET)); /* the reset was written down */
 }
 
+/** Bytes of the newest record: its body, 12 before it, 4 behind. */
+static uint32_t record_length(void) {
+    const uint8_t *bytes = live.bus.store[TAPER_STORE_STATION][1u - live.station.record.next_copy].data;
+    return 16u + bytes[4] + 256u * bytes[5];
+}
+
 static void test_row_30_every_single_bit_that_rots_is_found(void) {
     set_failsafe(7000);
     live_bench_revive_station(); /* both copies have it */
     live_bench_run_ms(LIVE_POLL_ms);
-    for (uint32_t bit = 0; bit < 8 * sizeof(taper_station_record_t); bit++) {
-        const unsigned newest = 1u - live.station.record_copy;
-        taper_membus_rot(&live.bus, newest, bit);
+    for (uint32_t bit = 0; bit < 8 * record_length(); bit++) {
+        const unsigned newest = 1u - live.station.record.next_copy;
+        taper_membus_rot(&live.bus, TAPER_STORE_STATION, newest, bit);
         live_bench_revive_station();
         live_bench_run_ms(LIVE_POLL_ms);
         TEST_ASSERT_EQUAL_UINT(1, fault_events(TAPER_EVENT_STORE_OLD_COPY));

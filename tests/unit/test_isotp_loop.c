@@ -263,6 +263,7 @@ static void test_a_sender_that_stops_at_any_frame_leaves_the_link_free_for_the_n
 }
 
 #define NOISE_CAPACITY 100u
+#define NOISE_FRAMES   (1000000u / TEST_SHARE)
 
 static void assert_sound(const taper_isotp_t *link, const uint8_t *buffer) {
     TEST_ASSERT_TRUE(link->in.state <= TAPER_ISOTP_REFUSED && link->out.state <= TAPER_ISOTP_REFUSED);
@@ -317,7 +318,7 @@ static void test_a_million_frames_of_noise_break_nothing(void) {
     options.block_size = 4;
     TEST_ASSERT_EQUAL(TAPER_OK, taper_isotp_init(&a, &options));
     a_buffer[NOISE_CAPACITY] = 0xA5;
-    for (unsigned k = 0; k < 1000000; k++) {
+    for (unsigned k = 0; k < NOISE_FRAMES; k++) {
         taper_frame_t frame = noise(&random);
         if (frame.data[0] >> 4 == 2 && scene_random(&random) % 8 != 0) {
             frame.data[0] = (uint8_t)(0x20u | a.in.sequence);
@@ -331,8 +332,8 @@ static void test_a_million_frames_of_noise_break_nothing(void) {
         stir(&a, &random, now_ms);
         assert_sound(&a, a_buffer);
     }
-    TEST_ASSERT_TRUE(whole > 10000); /* the noise does reach deep */
-    TEST_ASSERT_TRUE(long_ones > 100);
+    TEST_ASSERT_TRUE(whole > NOISE_FRAMES / 100); /* the noise does reach deep */
+    TEST_ASSERT_TRUE(long_ones > NOISE_FRAMES / 10000);
 }
 
 int main(void) {

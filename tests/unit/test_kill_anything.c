@@ -7,7 +7,7 @@
 #include "live_bench.h"
 #include "unity.h"
 
-#define KILLS       200
+#define KILLS       (200 / TEST_SHARE)
 #define VEHICLES    8u
 #define LIMIT_KW    30.0
 #define RESUMES_ms  30000u

@@ -13,7 +13,7 @@
 #include "unity.h"
 
 #define CONNECTORS  4u
-#define STEPS       100000u
+#define STEPS       (100000u / TEST_SHARE)
 #define VALIDITY_ms 3000u
 #define CYCLE_ms    500u
 #define LIMIT_W     9200 /* at most: 40 A of the 104 A that the four could draw by their feeders */

@@ -7,6 +7,7 @@
 #include "scene.h"
 #include "solver.h"
 #include "taper/planner.h"
+#include "taper/real_math.h"
 #include "taper/solvers.h"
 #include "taper/stations.h"
 #include "types.h"
@@ -96,7 +97,7 @@ static void test_the_answer_does_not_depend_on_the_slices(void) {
     const uint16_t iterations = taper_planner_iterations(&planner);
     TEST_ASSERT_GREATER_THAN_UINT16(50, iterations); /* long enough to change the penalty on the way */
     read_plan(whole);
-    const uint16_t slices[] = {10, 20, 37, 50, 120};
+    const uint16_t slices[] = {10, 20, 37, 50, 120, 1, 3, 7, 9};
     for (unsigned k = 0; k < sizeof slices / sizeof slices[0]; k++) {
         start_hub();
         TEST_ASSERT_EQUAL(TAPER_VERDICT_SOLVED, solve(slices[k]));
@@ -112,6 +113,68 @@ static void test_a_slice_does_no_more_than_it_may(void) {
     TEST_ASSERT_EQUAL_UINT16(20, taper_planner_iterations(&planner));
     TEST_ASSERT_EQUAL(TAPER_VERDICT_SOLVING, taper_planner_run(&planner, 29)); /* whole tens only */
     TEST_ASSERT_EQUAL_UINT16(40, taper_planner_iterations(&planner));
+}
+
+static void test_a_short_slice_holds_iterations_or_one_piece_of_other_work(void) {
+    start_hub();
+    taper_planner_start(&planner, &snapshot, &course);
+    unsigned pieces[TAPER_WORK_PENALTY + 1] = {0};
+    while (planner.verdict == TAPER_VERDICT_SOLVING) {
+        if (planner.iterations == 49) { /* a penalty that the planner will want to change */
+            osqp_update_rho(planner.solver->osqp, 100);
+        }
+        const taper_work_t work = planner.next;
+        const uint16_t before = planner.iterations;
+        taper_planner_run(&planner, 7);
+        pieces[work]++;
+        const uint16_t done = (uint16_t)(planner.iterations - before);
+        TEST_ASSERT_TRUE(work == TAPER_WORK_ITERATIONS ? done >= 1 && done <= 7 : done == 0);
+    }
+    TEST_ASSERT_EQUAL(TAPER_VERDICT_SOLVED, planner.verdict);
+    TEST_ASSERT_EQUAL_UINT(1, pieces[TAPER_WORK_RESET]);
+    TEST_ASSERT_EQUAL_UINT(1, pieces[TAPER_WORK_MATRICES]);
+    TEST_ASSERT_EQUAL_UINT(1, pieces[TAPER_WORK_VECTORS]);
+    TEST_ASSERT_GREATER_THAN_UINT(0, pieces[TAPER_WORK_PENALTY]);
+}
+
+static void test_a_new_problem_takes_the_place_of_one_that_is_only_half_handed_over(void) {
+    static taper_real_t after[8 * 24], fresh[8 * 24];
+    start_hub();
+    taper_planner_start(&planner, &snapshot, &course);
+    taper_planner_run(&planner, 1);
+    course.limit_W[0] = 33000;
+    taper_planner_start(&planner, &snapshot, &course);
+    TEST_ASSERT_EQUAL(TAPER_VERDICT_SOLVED, run_to_the_end(1));
+    read_plan(after);
+    start_hub();
+    TEST_ASSERT_EQUAL(TAPER_VERDICT_SOLVED, solve(50));
+    read_plan(fresh);
+    TEST_ASSERT_EQUAL_MEMORY(fresh, after, sizeof fresh);
+}
+
+/** Solve with a tolerance that is `part` of the residuals that 500 iterations leave. */
+static taper_verdict_t solve_to_a_part_of_what_is_left(OSQPFloat part, uint16_t slice) {
+    OSQPSolver *osqp = planner.solver->osqp;
+    start_hub();
+    osqp->settings->eps_abs = (OSQPFloat)1e-30;
+    osqp->settings->eps_rel = 0;
+    TEST_ASSERT_EQUAL(TAPER_VERDICT_LATE, solve(slice));
+    const OSQPFloat left = taper_real_max(taper_real_max(osqp->info->prim_res, osqp->info->dual_res),
+                                          (OSQPFloat)fabs((double)osqp->info->duality_gap));
+    start_hub();
+    osqp->settings->eps_abs = left * part;
+    osqp->settings->eps_rel = 0;
+    return solve(slice);
+}
+
+static void test_what_is_nearly_there_at_the_last_iteration_is_inaccurate_however_sliced(void) {
+    const uint16_t slices[] = {TAPER_MAX_ITERATIONS, 10, 9};
+    for (unsigned k = 0; k < 3; k++) {
+        TEST_ASSERT_EQUAL(TAPER_VERDICT_INACCURATE,
+                          solve_to_a_part_of_what_is_left((OSQPFloat)0.125, slices[k]));
+        TEST_ASSERT_EQUAL_UINT16(TAPER_MAX_ITERATIONS, taper_planner_iterations(&planner));
+        TEST_ASSERT_EQUAL(TAPER_VERDICT_LATE, solve_to_a_part_of_what_is_left((OSQPFloat)0.0625, slices[k]));
+    }
 }
 
 static void test_a_usable_plan_keeps_every_limit_exactly(void) {
@@ -167,6 +230,7 @@ static void test_a_contradiction_is_refused_and_the_next_problem_is_solved(void)
 
 static void test_values_that_are_not_finite_are_seen_and_forgotten(void) {
     taper_planner_start(&planner, &snapshot, &course);
+    TEST_ASSERT_EQUAL(TAPER_VERDICT_SOLVING, taper_planner_run(&planner, TAPER_MIN_SLICE));
     poison_linear_cost(planner.solver);
     TEST_ASSERT_EQUAL(TAPER_VERDICT_NOT_FINITE, run_to_the_end(50));
     TEST_ASSERT_EQUAL(TAPER_VERDICT_SOLVED, solve(50));
@@ -375,6 +439,9 @@ int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_the_answer_does_not_depend_on_the_slices);
     RUN_TEST(test_a_slice_does_no_more_than_it_may);
+    RUN_TEST(test_a_short_slice_holds_iterations_or_one_piece_of_other_work);
+    RUN_TEST(test_a_new_problem_takes_the_place_of_one_that_is_only_half_handed_over);
+    RUN_TEST(test_what_is_nearly_there_at_the_last_iteration_is_inaccurate_however_sliced);
     RUN_TEST(test_a_usable_plan_keeps_every_limit_exactly);
     RUN_TEST(test_the_same_problem_again_is_solved_at_once);
     RUN_TEST(test_a_second_start_repeats_the_first_to_the_bit);

@@ -250,7 +250,7 @@ def test_a_log_that_nobody_reads_does_not_hold_it_up(ear):
         (("--can", "vcan0", "--station", "hub", "--failsafe-kw", "12"), 2, "--failsafe-kw: above the own failsafe"),
         (("--can", "vcan0", "--station", "hub", "--tick-ms", "10"), 2, "--tick-ms: not a whole number in 20..1000"),
         (("--can", "vcan0", "--station", "hub", "--time-scale", "0"), 2, "--time-scale: not a whole number"),
-        (("--can", "vcan0", "--station", "hub", "--iterations", "5"), 2, "--iterations: not a whole number"),
+        (("--can", "vcan0", "--station", "hub", "--iterations", "0"), 2, "--iterations: not a whole number"),
         (("--can", "vcan0", "--station", "hub", "--log-level", "loud"), 2, "--log-level: not one of"),
         (("--can", "vcan0", "--station", "hub", "extra"), 2, "unexpected argument 'extra'"),
         (("--can", "vcan7", "--station", "hub"), 1, "vcan7"),

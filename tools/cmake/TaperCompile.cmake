@@ -22,6 +22,15 @@ if(TAPER_SANITIZE)
     add_link_options(-fsanitize=address,undefined)
 endif()
 
+# 32-bit Linux: dates after 2038, recordings of more than 2 GB, and files with large inode numbers.
+if(CMAKE_SYSTEM_NAME STREQUAL Linux AND CMAKE_SIZEOF_VOID_P EQUAL 4)
+    add_compile_definitions(_FILE_OFFSET_BITS=64 _TIME_BITS=64)
+endif()
+
+if(TAPER_STATIC)
+    string(APPEND CMAKE_EXE_LINKER_FLAGS " -static")
+endif()
+
 # Our own code: every warning is an error. Generated and foreign code does not link this.
 add_library(taper_strict INTERFACE)
 target_compile_options(taper_strict INTERFACE
@@ -38,10 +47,21 @@ function(taper_layer name)
     cmake_parse_arguments(LAYER "FLOAT" "" "SOURCES;DEPENDS" ${ARGN})
     add_library(taper_${name} STATIC ${LAYER_SOURCES})
     target_include_directories(taper_${name} PUBLIC include)
+    taper_headers(${CMAKE_CURRENT_SOURCE_DIR}/include)
     list(TRANSFORM LAYER_DEPENDS PREPEND taper_)
     target_link_libraries(taper_${name} PUBLIC ${LAYER_DEPENDS} PRIVATE taper_strict)
     if(TAPER_CAN_FORBID_FLOAT AND NOT LAYER_FLOAT)
         target_compile_options(taper_${name} PRIVATE -mgeneral-regs-only)
     endif()
-    set_property(GLOBAL APPEND PROPERTY TAPER_CORE_LIBRARIES taper_${name})
+    taper_is_core(taper_${name})
+endfunction()
+
+# taper_is_core(LIBRARY): it goes into images, and into libtaper.a; the tests look into it from outside.
+function(taper_is_core library)
+    set_property(GLOBAL APPEND PROPERTY TAPER_CORE_LIBRARIES ${library})
+endfunction()
+
+# taper_headers(FOLDER): its taper/*.h are for who uses Taper.
+function(taper_headers folder)
+    set_property(GLOBAL APPEND PROPERTY TAPER_HEADER_FOLDERS ${folder})
 endfunction()

@@ -1,19 +1,19 @@
-# Runs codegen at configure time, when an input changed, into <build>/generated: ${TAPER_GENERATED}.
+# Runs codegen at configure time, when an input changed, into <build of Taper>/generated: ${TAPER_GENERATED}.
 
 find_program(TAPER_PYTHON NAMES python3 HINTS ${PROJECT_SOURCE_DIR}/build/venv/bin NO_DEFAULT_PATH NO_CACHE)
 if(NOT TAPER_PYTHON)
     find_program(TAPER_PYTHON NAMES python3 NO_CACHE REQUIRED)
 endif()
 
-set(TAPER_GENERATED ${CMAKE_BINARY_DIR}/generated)
+set(TAPER_GENERATED ${PROJECT_BINARY_DIR}/generated)
 
 file(GLOB TAPER_CODEGEN_INPUTS CONFIGURE_DEPENDS
-    ${PROJECT_SOURCE_DIR}/codegen/*.py ${PROJECT_SOURCE_DIR}/codegen/*.toml ${PROJECT_SOURCE_DIR}/codegen/stations/*.toml)
+    ${PROJECT_SOURCE_DIR}/codegen/*.py ${PROJECT_SOURCE_DIR}/codegen/*.toml ${TAPER_STATION_DIR}/*.toml)
 set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${TAPER_CODEGEN_INPUTS})
 
 function(taper_generate)
     list(JOIN TAPER_STATIONS "," stations)
-    set(arguments --stations ${stations} --real ${TAPER_REAL})
+    set(arguments --stations ${stations} --station-dir ${TAPER_STATION_DIR} --real ${TAPER_REAL})
     if(NOT TAPER_WITH_PLANNER)
         list(APPEND arguments --no-planner)
     endif()
@@ -22,7 +22,7 @@ function(taper_generate)
         file(SHA256 ${input} hash)
         string(APPEND key " ${input} ${hash}")
     endforeach()
-    set(stamp ${CMAKE_BINARY_DIR}/generated.stamp)
+    set(stamp ${PROJECT_BINARY_DIR}/generated.stamp)
     set(made "")
     if(EXISTS ${stamp})
         file(READ ${stamp} made)

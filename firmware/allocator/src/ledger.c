@@ -170,6 +170,7 @@ static void hear_echo(taper_ledger_entry_t *entry, unsigned counter, uint32_t fo
         return; /* perhaps a setpoint of the controller before us, with the same counter */
     }
     end_unknown(entry, followed_ms);
+    entry->accepts = true;
     entry->over_fallback_mA = 0; /* what is open is younger than what ran out */
     unsigned c = 0;
     for (unsigned left = entry->echoed; left != 0; left >>= 1) {
@@ -253,6 +254,18 @@ void taper_ledger_update(taper_ledger_t *ledger, uint32_t now_ms) {
     for (uint8_t i = 0; i < ledger->config->connector_count; i++) {
         update_one(ledger, i, &ledger->entry[i], now_ms);
     }
+}
+
+bool taper_ledger_is_accepted(const taper_ledger_t *ledger, uint8_t connector) {
+    return ledger->entry[connector].accepts;
+}
+
+bool taper_ledger_is_starting(const taper_ledger_t *ledger) {
+    int32_t unknown_mA = 0;
+    for (uint8_t i = 0; i < ledger->config->connector_count; i++) {
+        unknown_mA |= ledger->entry[i].unknown_mA;
+    }
+    return unknown_mA != 0;
 }
 
 int32_t taper_ledger_told_mA(const taper_ledger_t *ledger, uint8_t connector) {

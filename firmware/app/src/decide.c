@@ -7,10 +7,6 @@
 #define SCALE_percent 75
 #define SCALE_ROUNDS  4
 
-static uint32_t world_ms(const taper_station_t *station, uint32_t now_ms) {
-    return now_ms * station->options.time_scale; /* both clocks wrap, and so does their product */
-}
-
 /** The greatest current of a connector's conductors, or absent. */
 static int32_t measured_mA(const taper_station_t *station, uint8_t i, uint32_t now_ms) {
     const taper_evse_status_t *status = &station->sessions.session[i].status;
@@ -26,6 +22,9 @@ static void note_draw(taper_station_t *station, uint8_t i, taper_draw_state_t be
     const taper_draw_state_t state = station->draw[i].state;
     if (state == before) {
         return;
+    }
+    if (state == TAPER_DRAW_LOCKED || before == TAPER_DRAW_LOCKED) {
+        station->sessions.changes++; /* a restart must not unlock it */
     }
     if (state == TAPER_DRAW_OVER) {
         taper_station_count(station, TAPER_COUNTER_OVER_DRAWS);
@@ -44,14 +43,14 @@ static void watch_draw(taper_station_t *station, uint8_t i, uint32_t now_ms) {
     taper_draw_t *draw = &station->draw[i];
     const taper_draw_state_t before = draw->state;
     const taper_draw_report_t report = {
-        .plugged = station->sessions.session[i].vehicle_there,
+        .plugged = taper_session_may_be_there(&station->sessions, i),
         .session = taper_session_number(&station->sessions, i),
         .allowed_mA = taper_ledger_told_mA(&station->ledger, i),
         .setpoint_mA = taper_max_i32(station->sent_mA[i], 0),
         .measured_mA = measured_mA(station, i, now_ms),
         .min_mA = demand->min_mA,
     };
-    if (taper_draw_update(draw, &report, world_ms(station, now_ms))) {
+    if (taper_draw_update(draw, &report, taper_station_world_ms(station, now_ms))) {
         station->sessions.revision++; /* the planner is to know */
     }
     note_draw(station, i, before, report.measured_mA);
@@ -127,6 +126,7 @@ static void allocate(taper_station_t *station, uint32_t now_ms) {
         reserved_mA[i] = reserve_mA(station, i, now_ms);
         station->setpoint_session[i] = taper_session_number(&station->sessions, i);
     }
+    taper_record_resume_turns(station, now_ms);
     taper_allocate(&station->allocator, config, &station->snapshot, &station->proposal, &station->rows,
                    reserved_mA, &station->target);
     if (station->rival_heard || station->stopped) {
@@ -200,7 +200,7 @@ static void grant(taper_station_t *station, uint32_t now_ms) {
     const taper_station_config_t *config = station->options.config;
     taper_setpoints_t granted = {{0}}; /* all of it: it is compared whole */
     taper_shape_bound(&station->shape, config, &station->snapshot, &station->target,
-                      world_ms(station, now_ms), &station->shaped);
+                      taper_station_world_ms(station, now_ms), &station->shaped);
     taper_ledger_grant(&station->ledger, config, &station->snapshot, station->proposal.rank, &station->rows,
                        &station->shaped, &granted);
     enforce(station, &granted);

@@ -155,6 +155,9 @@ static void use_message(taper_station_t *station, const sender_t *sender, const 
     case TAPER_MESSAGE_EVSE_STATUS:
         taper_ledger_hear(&station->ledger, (uint8_t)sender->connector, &message->as.evse_status, at_ms);
         (void)taper_session_apply_to(&station->sessions, (uint8_t)sender->connector, message, at_ms);
+        if (taper_ledger_is_accepted(&station->ledger, (uint8_t)sender->connector)) {
+            taper_session_confirm(&station->sessions, (uint8_t)sender->connector);
+        }
         break;
     default:
         (void)taper_session_apply_to(&station->sessions, (uint8_t)sender->connector, message, at_ms);
@@ -195,19 +198,21 @@ static void answer_curve(taper_station_t *station, taper_status_t status, taper_
 }
 
 static void set_curve(taper_station_t *station) {
-    const taper_limit_curve_t *curve = &station->incoming.curve;
+    const taper_limit_curve_t *curve = &station->scratch.incoming.curve;
     answer_curve(station, taper_limits_set_curve(&station->limits, TAPER_CURVE_OF_GATEWAY, curve),
                  TAPER_EVENT_CURVE_SET, curve->count);
 }
 
 static void set_price(taper_station_t *station) {
-    const taper_price_curve_t *price = &station->incoming.price;
+    const taper_price_curve_t *price = &station->scratch.incoming.price;
     answer_curve(station, taper_limits_set_price(&station->limits, price), TAPER_EVENT_PRICE_SET,
                  price->count);
 }
 
 static void note_identifier(taper_station_t *station, const taper_frame_t *frame, uint8_t connector) {
     const bool known = taper_transfers_identifier(&station->transfers, connector)[0] != '\0';
+    station->identifier_kept[connector] = false;
+    station->sessions.changes++;
     taper_event_note(&station->events, TAPER_EVENT_IDENTIFIED, frame->bus, (uint8_t)(frame->id & 0x3Fu),
                      known);
 }
@@ -219,10 +224,10 @@ static void take_transfer(taper_station_t *station, const taper_frame_t *frame) 
                                           .unix_s = taper_session_unix_s(&station->sessions, now_ms),
                                           .time_scale = station->sessions.time_scale,
                                           .events = &station->events};
-    switch (taper_transfers_take(&station->transfers, frame, &scene, &station->incoming)) {
+    switch (taper_transfers_take(&station->transfers, frame, &scene, &station->scratch.incoming)) {
     case TAPER_RESULT_CURVE: set_curve(station); break;
     case TAPER_RESULT_PRICE: set_price(station); break;
-    case TAPER_RESULT_IDENTIFIER: note_identifier(station, frame, station->incoming.connector); break;
+    case TAPER_RESULT_IDENTIFIER: note_identifier(station, frame, station->scratch.incoming.connector); break;
     case TAPER_RESULT_REFUSED: /* counted there, and noted with those that ran out of time */
     case TAPER_RESULT_NONE:
     default: break;

@@ -11,7 +11,7 @@
 static bool options_are_sound(const taper_station_options_t *options) {
     return options->config != NULL && options->port != NULL && options->port->receive != NULL &&
            options->port->send != NULL && (options->policy == NULL || options->policy->propose != NULL) &&
-           options->iterations_per_tick >= TAPER_MIN_SLICE && options->time_scale <= TAPER_MAX_TIME_SCALE;
+           options->iterations_per_tick >= 1 && options->time_scale <= TAPER_MAX_TIME_SCALE;
 }
 
 static void init_layers(taper_station_t *station) {
@@ -74,6 +74,7 @@ static void begin(taper_station_t *station, uint32_t now_ms) {
     station->events.unix_s = taper_session_unix_s(&station->sessions, now_ms);
     if (!station->started) {
         station->started = true;
+        taper_record_start_clock(station, now_ms);
         taper_ledger_init(&station->ledger, config, taper_station_validity_ms(&station->options),
                           station->options.time_scale, now_ms);
         taper_event_note(&station->events, TAPER_EVENT_STARTED, 0, 0,
@@ -112,8 +113,10 @@ static void watch_ticks(taper_station_t *station, uint32_t now_ms) {
 /** Who leaves takes his name along. */
 static void forget_identifiers(taper_station_t *station) {
     for (uint8_t i = 0; i < station->options.config->connector_count; i++) {
-        if (!station->sessions.session[i].vehicle_there) {
+        const bool was_another = station->identifier_kept[i] && !taper_session_is_kept(&station->sessions, i);
+        if (was_another || !taper_session_may_be_there(&station->sessions, i)) {
             taper_transfers_forget(&station->transfers, i);
+            station->identifier_kept[i] = false;
         }
     }
 }
@@ -133,7 +136,7 @@ void taper_station_step(taper_station_t *station, uint32_t now_ms) {
     taper_station_send_transfers(station, now_ms);
     memset(station->status_due, 1, sizeof station->status_due);
     taper_station_send_status(station, now_ms);
-    taper_record_update(station, now_ms);
+    taper_record_update(station, true, now_ms);
     if (port->kick_watchdog != NULL && taper_self_is_sound(&station->self)) {
         port->kick_watchdog(port->context);
     }
@@ -146,6 +149,7 @@ void taper_station_poll(taper_station_t *station, uint32_t now_ms) {
     taper_alarm_update(station, now_ms);
     taper_station_send_transfers(station, now_ms);
     taper_station_send_status(station, now_ms);
+    taper_record_update(station, false, now_ms);
 }
 
 void taper_station_stop(taper_station_t *station, uint32_t now_ms) {

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "iterate.h"
 #include "matrices.h"
 #include "project.h"
 #include "residual.h"
@@ -32,8 +33,7 @@ _Static_assert(sizeof(OSQPFloat) == sizeof(taper_real_t),
 #define RHO_INTERVAL  50
 #define RHO_TOLERANCE ((OSQPFloat)2)
 
-_Static_assert(TAPER_MIN_SLICE <= RHO_INTERVAL && RHO_INTERVAL % TAPER_MIN_SLICE == 0,
-               "slices end where OSQP looks");
+_Static_assert(RHO_INTERVAL % TAPER_MIN_SLICE == 0, "the penalty is changed where the solver was looked at");
 _Static_assert(TAPER_MAX_ITERATIONS % RHO_INTERVAL == 0, "the budget is a number of intervals");
 
 static bool solver_fits(const taper_solver_t *solver, const taper_horizon_t *horizon) {
@@ -59,13 +59,13 @@ static bool load_matrices(taper_planner_t *planner) {
 }
 
 /** Forget everything that the solver learned: after garbage nothing of it can be trusted. */
-static void reset(taper_planner_t *planner) {
+static void forget(taper_planner_t *planner) {
     const taper_solver_t *solver = planner->solver;
     memset(planner->session, 0, sizeof planner->session);
     memset(solver->osqp->solution->x, 0, (size_t)solver->variables * sizeof(OSQPFloat));
     memset(solver->osqp->solution->y, 0, (size_t)solver->rows * sizeof(OSQPFloat));
     planner->matrix_is_current = false;
-    osqp_update_rho(solver->osqp, LEAST_RHO);
+    taper_forget_equalities(solver->osqp);
     osqp_cold_start(solver->osqp);
 }
 
@@ -74,14 +74,19 @@ taper_status_t taper_planner_init(taper_planner_t *planner, const taper_solver_t
     memset(planner, 0, sizeof *planner);
     planner->solver = solver;
     taper_horizon_shape(&planner->horizon, config);
-    if (!solver_fits(solver, &planner->horizon) || !load_matrices(planner)) {
+    if (!solver_fits(solver, &planner->horizon)) {
+        return TAPER_ERR_CONFIG;
+    }
+    (void)osqp_update_rho(solver->osqp, LEAST_RHO); /* a fresh solver has nothing to factorise yet */
+    if (!load_matrices(planner)) {
         return TAPER_ERR_CONFIG;
     }
     solver->osqp->settings->eps_abs = ABSOLUTE_TOLERANCE;
     solver->osqp->settings->eps_rel = RELATIVE_TOLERANCE;
     solver->osqp->settings->eps_prim_inf = NEVER_INFEASIBLE;
     solver->osqp->settings->eps_dual_inf = NEVER_INFEASIBLE;
-    reset(planner);
+    forget(planner);
+    planner->next = TAPER_WORK_RESET;
     return TAPER_OK;
 }
 
@@ -96,17 +101,14 @@ void taper_planner_start(taper_planner_t *planner, const taper_snapshot_t *snaps
                          const taper_course_t *course) {
     taper_horizon_t *horizon = &planner->horizon;
     const uint8_t shift = steps_since(planner, snapshot->now_ms);
-    if (!taper_planner_is_usable(planner->verdict) && planner->verdict != TAPER_VERDICT_NONE) {
-        reset(planner);
+    planner->next = TAPER_WORK_MATRICES;
+    if (!taper_planner_is_usable(planner->verdict)) {
+        forget(planner);
+        planner->next = TAPER_WORK_RESET;
     }
     taper_horizon_build(horizon, horizon->config, snapshot, course);
-    const bool accepted =
-        load_matrices(planner) &&
-        osqp_update_data_vec(planner->solver->osqp, horizon->linear, horizon->lower, horizon->upper) == 0;
-    if (accepted) {
-        taper_warm_start(planner, snapshot, shift);
-    }
-    planner->verdict = accepted ? TAPER_VERDICT_SOLVING : TAPER_VERDICT_REFUSED;
+    taper_warm_start(planner, snapshot, shift);
+    planner->verdict = TAPER_VERDICT_SOLVING;
     planner->iterations = 0;
     planner->slices = 0;
     planner->started_ms = snapshot->now_ms;
@@ -116,15 +118,6 @@ bool taper_planner_is_usable(taper_verdict_t verdict) {
     return verdict == TAPER_VERDICT_SOLVED || verdict == TAPER_VERDICT_INACCURATE;
 }
 
-static bool all_finite(const OSQPFloat *values, OSQPInt count) {
-    for (OSQPInt k = 0; k < count; k++) {
-        if (!isfinite(values[k])) {
-            return false;
-        }
-    }
-    return true;
-}
-
 /** Whether the rows hold by our own account: the solver's says nothing if its memory is not what we gave it. */
 static bool rows_hold(const taper_planner_t *planner) {
     const taper_residual_t residual = taper_residual(&planner->horizon, planner->solver->osqp->solution->x);
@@ -132,75 +125,111 @@ static bool rows_hold(const taper_planner_t *planner) {
     return residual.worst <= RESIDUAL_FACTOR * tolerance + ABSOLUTE_TOLERANCE;
 }
 
-static bool has_stopped(const taper_planner_t *planner) {
-    return planner->solver->osqp->info->status_val == OSQP_SOLVED ||
-           planner->iterations >= TAPER_MAX_ITERATIONS;
-}
-
-/** Verdict on a solver that stopped. `osqp_solve` returns 0 whatever happened: only the status tells. */
+/** Verdict on what the last look saw; the last of a problem decides. */
 static taper_verdict_t judge(const taper_planner_t *planner) {
-    const taper_solver_t *solver = planner->solver;
-    const OSQPInt status = solver->osqp->info->status_val;
-    if (status == OSQP_PRIMAL_INFEASIBLE || status == OSQP_DUAL_INFEASIBLE || status == OSQP_NON_CVX ||
-        status == OSQP_PRIMAL_INFEASIBLE_INACCURATE || status == OSQP_DUAL_INFEASIBLE_INACCURATE) {
-        return TAPER_VERDICT_REFUSED; /* standing still is always feasible: a numerical fault */
-    }
-    if (!all_finite(solver->osqp->solution->x, solver->variables) ||
-        !all_finite(solver->osqp->solution->y, solver->rows)) {
+    const OSQPSolver *osqp = planner->solver->osqp;
+    const OSQPInt status = osqp->info->status_val;
+    if (!taper_iterates_are_finite(osqp)) {
         return TAPER_VERDICT_NOT_FINITE;
     }
-    if (!has_stopped(planner)) {
-        return TAPER_VERDICT_SOLVING;
+    switch (status) {
+    case OSQP_SOLVED: return TAPER_VERDICT_SOLVED;
+    case OSQP_SOLVED_INACCURATE: return TAPER_VERDICT_INACCURATE;
+    case OSQP_UNSOLVED:
+        return planner->iterations < TAPER_MAX_ITERATIONS ? TAPER_VERDICT_SOLVING : TAPER_VERDICT_LATE;
+    default: return TAPER_VERDICT_REFUSED; /* standing still is always feasible: a numerical fault */
     }
-    if (status != OSQP_SOLVED && status != OSQP_SOLVED_INACCURATE) {
-        return TAPER_VERDICT_LATE;
-    }
-    if (!rows_hold(planner)) {
-        return TAPER_VERDICT_RESIDUAL;
-    }
-    return status == OSQP_SOLVED ? TAPER_VERDICT_SOLVED : TAPER_VERDICT_INACCURATE;
 }
 
-/**
- * Change the penalty if the residuals are out of balance. OSQP counts its iterations anew in every call and would never
- * get there in small slices; done here, a solve takes the same steps however it is sliced.
- */
-static void adapt_penalty(OSQPSolver *osqp) {
+/** The penalty for the next interval: the present one, unless the residuals are out of balance. */
+static OSQPFloat next_penalty(const OSQPSolver *osqp) {
     const OSQPFloat present = osqp->settings->rho;
-    const OSQPFloat estimate = osqp->info->rho_estimate;
-    if (!isfinite(estimate)) {
-        return;
+    const OSQPFloat balancing = taper_balancing_penalty(osqp);
+    if (!isfinite(balancing)) {
+        return present;
     }
-    const OSQPFloat better = taper_real_max(estimate, LEAST_RHO);
-    if (better > present * RHO_TOLERANCE || better * RHO_TOLERANCE < present) {
-        osqp_update_rho(osqp, better);
+    const OSQPFloat better = taper_real_max(balancing, LEAST_RHO);
+    return better > present * RHO_TOLERANCE || better * RHO_TOLERANCE < present ? better : present;
+}
+
+/** See how far the solver is. */
+static void look(taper_planner_t *planner) {
+    OSQPSolver *osqp = planner->solver->osqp;
+    taper_look(osqp, planner->iterations >= TAPER_MAX_ITERATIONS);
+    planner->verdict = judge(planner);
+    if (taper_planner_is_usable(planner->verdict)) {
+        taper_store_iterates(osqp);
+        planner->verdict = rows_hold(planner) ? planner->verdict : TAPER_VERDICT_RESIDUAL;
+    }
+    if (planner->verdict == TAPER_VERDICT_SOLVING && planner->iterations % RHO_INTERVAL == 0 &&
+        next_penalty(osqp) != osqp->settings->rho) {
+        planner->next = TAPER_WORK_PENALTY;
     }
 }
 
-/** Iterate up to the end of the slice or of the penalty's interval. @return iterations done. */
+/** Iterate up to the next look or the end of the slice. @return iterations done. */
 static uint16_t iterate(taper_planner_t *planner, uint16_t most) {
-    OSQPSolver *osqp = planner->solver->osqp;
-    const uint16_t to_interval = (uint16_t)(RHO_INTERVAL - planner->iterations % RHO_INTERVAL);
-    osqp->settings->max_iter = most < to_interval ? most : to_interval;
-    const bool ran = osqp_solve(osqp) == 0;
-    const uint16_t done = (uint16_t)osqp->info->iter;
-    planner->iterations = (uint16_t)(planner->iterations + done);
-    planner->verdict = ran ? judge(planner) : TAPER_VERDICT_REFUSED;
-    if (planner->verdict == TAPER_VERDICT_SOLVING && planner->iterations % RHO_INTERVAL == 0) {
-        adapt_penalty(osqp);
+    const uint16_t to_look = (uint16_t)(TAPER_MIN_SLICE - planner->iterations % TAPER_MIN_SLICE);
+    const uint16_t count = most < to_look ? most : to_look;
+    taper_iterate(planner->solver->osqp, count);
+    planner->iterations = (uint16_t)(planner->iterations + count);
+    if (count == to_look) {
+        look(planner);
     }
-    return done;
+    return count;
+}
+
+/** Hand vectors and the starting point over; rows that became or ceased to be equalities cost a factorisation. */
+static bool load_vectors(taper_planner_t *planner) {
+    const taper_horizon_t *horizon = &planner->horizon;
+    OSQPSolver *osqp = planner->solver->osqp;
+    return osqp_update_data_vec(osqp, horizon->linear, horizon->lower, horizon->upper) == 0 &&
+           osqp_warm_start(osqp, osqp->solution->x, osqp->solution->y) == 0;
+}
+
+/** What comes before the next iteration, with one factorisation at most. */
+static void prepare(taper_planner_t *planner) {
+    OSQPSolver *osqp = planner->solver->osqp;
+    bool accepted = true;
+    switch ((taper_work_t)planner->next) {
+    case TAPER_WORK_RESET:
+        osqp_update_rho(osqp, LEAST_RHO);
+        planner->next = TAPER_WORK_MATRICES;
+        break;
+    case TAPER_WORK_MATRICES:
+        accepted = load_matrices(planner);
+        planner->next = TAPER_WORK_VECTORS;
+        break;
+    case TAPER_WORK_VECTORS:
+        accepted = load_vectors(planner);
+        planner->next = TAPER_WORK_ITERATIONS;
+        break;
+    default:
+        osqp_update_rho(osqp, next_penalty(osqp));
+        planner->next = TAPER_WORK_ITERATIONS;
+        break;
+    }
+    planner->verdict = accepted ? TAPER_VERDICT_SOLVING : TAPER_VERDICT_REFUSED;
 }
 
 taper_verdict_t taper_planner_run(taper_planner_t *planner, uint16_t iterations) {
     if (planner->verdict != TAPER_VERDICT_SOLVING) {
         return planner->verdict;
     }
-    int32_t left = taper_max_i32(iterations - iterations % TAPER_MIN_SLICE, TAPER_MIN_SLICE);
+    const bool is_short = iterations < TAPER_MIN_SLICE;
+    int32_t left = is_short ? taper_max_i32(iterations, 1) : iterations - iterations % TAPER_MIN_SLICE;
     while (left > 0 && planner->verdict == TAPER_VERDICT_SOLVING) {
-        left -= iterate(planner, (uint16_t)left);
+        const bool iterates = planner->next == TAPER_WORK_ITERATIONS;
+        if (iterates) {
+            left -= iterate(planner, (uint16_t)left);
+        } else {
+            prepare(planner);
+        }
+        if (is_short && (!iterates || planner->next != TAPER_WORK_ITERATIONS)) {
+            break; /* a factorisation never shares a short slice */
+        }
     }
-    planner->slices = (uint8_t)(planner->slices + (planner->slices < UINT8_MAX ? 1 : 0));
+    planner->slices++; /* a problem takes less than twice TAPER_MAX_ITERATIONS */
     if (taper_planner_is_usable(planner->verdict)) {
         taper_project(&planner->horizon, planner->solver->osqp->solution->x);
     }

@@ -62,5 +62,4 @@ void taper_warm_start(taper_planner_t *planner, const taper_snapshot_t *snapshot
         OSQPFloat *sums = osqp->solution->y + taper_first_sum_row(config) + (size_t)r * config->steps;
         shift_block(sums, config->steps, shift, growth);
     }
-    osqp_warm_start(osqp, osqp->solution->x, osqp->solution->y);
 }

@@ -5,8 +5,8 @@
 #include "solver.h"
 
 /**
- * Start the solver from its last answer, moved on by `shift` steps, without the vehicles that are new or gone in
- * `snapshot`; `planner->session` is that of the snapshot afterwards. Cost: O(rows).
+ * Make a starting point of the last answer, in place: moved on by `shift` steps, without the vehicles that are new or gone
+ * in `snapshot`; `planner->session` is that of the snapshot afterwards. Cost: O(rows).
  */
 void taper_warm_start(taper_planner_t *planner, const taper_snapshot_t *snapshot, uint8_t shift);
 

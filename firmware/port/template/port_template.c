@@ -12,7 +12,8 @@
  * - `bus` counts from 0 in the order of the station's description. `length` is the DLC, as received.
  * - `time_ms` is when the interrupt saw the frame, on the clock that taper_station_step() is called with. A board that does
  *   not know leaves it alone: the frame then counts as received when it is taken.
- * - Skip remote frames, error frames and 29-bit identifiers here. Do not check contents: the station does.
+ * - Skip remote frames, error frames, 29-bit identifiers, and what this board sends itself, if the controller hears that
+ *   (a FlexCAN does, unless SRXDIS is set). Do not check contents: the station does.
  * - The queue should hold a control tick's worth: about 11 frames a second per connector, and room for a burst.
  *   When it is full, drop the oldest frame and count it: the newest state is what matters. The count is what
  *   receive_overflows() tells.
@@ -64,8 +65,8 @@ static bool bus_is_off(void *context, uint8_t bus) {
     return false;
 }
 
-/* Bring that controller back: on an FDCAN or FlexCAN, leave its init or freeze mode. It needs 128 times eleven recessive
-   bits then; do not wait for them. Switch automatic recovery off, or the station's pauses have no effect. */
+/* Bring that controller back: on an FDCAN clear INIT, on a FlexCAN clear BOFFREC. It needs 128 times eleven recessive bits
+   then; do not wait for them. Switch automatic recovery off, or the station's pauses have no effect. */
 static void restart_bus(void *context, uint8_t bus) {
     taper_template_board_t *board = context;
     (void)board;
@@ -80,22 +81,26 @@ static uint32_t receive_overflows(void *context) {
 }
 
 /*
- * Copy `copy` (0 or 1) of the station's record in non-volatile memory, `length` bytes as they are: two flash sectors, or
- * two areas of an EEPROM or FRAM. The record has its own sequence number and CRC-32, so a write that power-off cuts short
- * may leave that copy torn; it must not harm the other. The station writes seldom, at most every ten seconds.
+ * Copy `copy` (0 or 1) of the record of an area (taper_store_area_t) in non-volatile memory, `length` bytes as they are, at
+ * most TAPER_STORE_RECORD_MAX: four flash sectors, or four ranges of an EEPROM or FRAM. A record has its own length,
+ * sequence number and CRC-32, so a write that power-off cuts short may leave that copy torn; it must not harm another.
+ * The station writes its own area at most every ten seconds, and every 15 minutes while vehicles charge; settings are
+ * written by hand. Flash that bears few erasures is erased only when a sector is full: append, and read the last one.
  */
-static bool store_read(void *context, unsigned copy, void *data, uint32_t length) {
+static bool store_read(void *context, unsigned area, unsigned copy, void *data, uint32_t length) {
     taper_template_board_t *board = context;
     (void)board;
+    (void)area;
     (void)copy;
     (void)data;
     (void)length;
     return false; /* never written */
 }
 
-static bool store_write(void *context, unsigned copy, const void *data, uint32_t length) {
+static bool store_write(void *context, unsigned area, unsigned copy, const void *data, uint32_t length) {
     taper_template_board_t *board = context;
     (void)board;
+    (void)area;
     (void)copy;
     (void)data;
     (void)length;

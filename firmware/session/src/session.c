@@ -5,11 +5,6 @@
 
 #include "session_internal.h"
 
-#define PARAM_A 0x1u
-#define PARAM_B 0x2u
-#define PARAM_C 0x4u
-#define PARAM_D 0x8u
-
 /* The clock is moved on before its anchor is half a wrap of the millisecond counter away. */
 #define CLOCK_CARRY_ms (3600u * 1000u)
 
@@ -52,10 +47,11 @@ int taper_session_connector(const taper_station_config_t *config, uint8_t bus, u
 }
 
 uint8_t taper_session_number(const taper_session_table_t *table, uint8_t connector) {
-    if (connector >= table->config->connector_count || !table->session[connector].in_session) {
+    if (connector >= table->config->connector_count) {
         return 0;
     }
-    return table->session[connector].used.a.session;
+    const taper_session_t *session = &table->session[connector];
+    return session->in_session || session->awaited ? session->used.a.session : 0;
 }
 
 static void hear(taper_heard_t *heard, uint32_t now_ms) {
@@ -63,8 +59,8 @@ static void hear(taper_heard_t *heard, uint32_t now_ms) {
     heard->at_ms = now_ms;
 }
 
-static void note(const taper_session_table_t *table, const taper_session_t *session, taper_event_code_t code,
-                 int32_t data) {
+void taper_session_note(const taper_session_table_t *table, const taper_session_t *session,
+                        taper_event_code_t code, int32_t data) {
     const taper_connector_config_t *connector = &table->config->connectors[session - table->session];
     taper_event_note(table->log, code, connector->bus, connector->node, data);
 }
@@ -96,6 +92,26 @@ static void begin_stay(taper_session_t *session, uint32_t now_ms) {
     session->plugged_in_ms = now_ms;
 }
 
+/* Whoever was there, or was awaited, is not any more. */
+static void end_session(taper_session_table_t *table, const taper_session_t *session) {
+    if (session->in_session || session->awaited) {
+        table->revision++;
+        table->changes++;
+        taper_session_note(table, session, TAPER_EVENT_SESSION_ENDED, session->used.a.session);
+    }
+}
+
+void taper_session_drop(taper_session_table_t *table, taper_session_t *session, uint32_t now_ms) {
+    const bool there = session->vehicle_there;
+    const bool unproved = session->unproved;
+    end_session(table, session);
+    begin_stay(session, now_ms);
+    session->vehicle_there = there;
+    if (unproved) {
+        session->param_seen &= (uint8_t)~PARAM_D; /* it may be the one that was kept */
+    }
+}
+
 /* minimum <= target <= maximum, where they were told. Planning moves the target; people should know why. */
 static bool parameters_contradict(const taper_ev_params_t *p) {
     const int32_t target_Wh = p->c.target_Wh;
@@ -110,12 +126,19 @@ static bool parameters_contradict(const taper_ev_params_t *p) {
 
 static void note_parameters(taper_session_table_t *table, const taper_session_t *session, bool begins) {
     if (begins) {
-        note(table, session, TAPER_EVENT_SESSION_BEGUN, session->used.a.session);
+        taper_session_note(table, session, TAPER_EVENT_SESSION_BEGUN, session->used.a.session);
     }
     if (parameters_contradict(&session->used)) {
         taper_count(&table->repaired);
-        note(table, session, TAPER_EVENT_REPAIRED, session->used.a.session);
+        taper_session_note(table, session, TAPER_EVENT_REPAIRED, session->used.a.session);
     }
+}
+
+/* What was received is another session than the one that is there, or awaited. */
+static bool is_another(const taper_session_t *session) {
+    const bool other_number = session->received.a.session != session->used.a.session;
+    return (session->in_session && other_number) ||
+           (session->unproved && (other_number || taper_session_kept_is_another(session)));
 }
 
 /* Put the received parameters into use if they are whole; that may begin a session. */
@@ -124,19 +147,21 @@ static void use_parameters(taper_session_table_t *table, taper_session_t *sessio
     if (!set_is_whole(session) || !(session->in_session || can_begin)) {
         return;
     }
-    if (session->in_session && session->received.a.session != session->used.a.session) {
-        note(table, session, TAPER_EVENT_SESSION_ENDED, session->used.a.session);
-        begin_stay(session, now_ms);
+    if (is_another(session)) {
+        taper_session_drop(table, session, now_ms);
     }
+    taper_session_confirm(table, (uint8_t)(session - table->session));
     const int32_t taper_W = matching_taper_W(session);
     const bool begins = !session->in_session;
     const bool is_new = begins || session->received.a.revision != session->used.a.revision;
     if (is_new || taper_W != session->used.d.taper_W) {
         table->revision++;
+        table->changes++;
     }
     session->used = session->received;
     session->used.d.taper_W = taper_W;
     session->in_session = true;
+    session->unproved = false;
     if (is_new) {
         note_parameters(table, session, begins);
     }
@@ -148,35 +173,57 @@ static void apply_status(taper_session_table_t *table, taper_session_t *session,
     hear(&session->status_heard, now_ms);
     if (session->lost) {
         session->lost = false;
-        note(table, session, TAPER_EVENT_CONNECTOR_BACK, 0);
+        taper_session_note(table, session, TAPER_EVENT_CONNECTOR_BACK, 0);
     }
     if (!status->ev_present || status->pilot == TAPER_PILOT_A) {
-        if (session->in_session) {
-            table->revision++;
-            note(table, session, TAPER_EVENT_SESSION_ENDED, session->used.a.session);
-        }
+        end_session(table, session);
         forget_vehicle(session);
         return;
     }
-    if (!session->vehicle_there) {
+    if (!session->vehicle_there && !session->awaited) {
         begin_stay(session, now_ms);
     }
+    session->vehicle_there = true;
     if (!session->in_session) {
         use_parameters(table, session, now_ms);
     }
 }
 
-static void apply_ev(taper_session_t *session, const taper_ev_status_t *ev, uint32_t now_ms) {
+/* What holds while the vehicle sleeps. */
+static bool asks_otherwise(const taper_ev_status_t *a, const taper_ev_status_t *b) {
+    return a->error != b->error || a->complete != b->complete || a->pause_requested != b->pause_requested ||
+           a->stop_requested != b->stop_requested;
+}
+
+static void apply_ev(taper_session_table_t *table, taper_session_t *session, const taper_ev_status_t *ev,
+                     uint32_t now_ms) {
+    const bool is_kept = session->in_session || session->awaited;
+    table->changes += is_kept && asks_otherwise(&session->ev, ev) ? 1u : 0u;
     session->ev = *ev;
     session->soc_is_new = true;
     hear(&session->ev_heard, now_ms);
 }
 
-static void apply_elec(taper_session_t *session, const taper_evse_elec_t *elec, uint32_t now_ms) {
+static void apply_elec(taper_session_table_t *table, taper_session_t *session, const taper_evse_elec_t *elec,
+                       uint32_t now_ms) {
+    if (elec->energy_Wh != TAPER_ABSENT) {
+        if (session->meter_open && elec->energy_Wh < session->session_Wh) {
+            taper_session_drop(table, session, now_ms);
+            use_parameters(table, session, now_ms);
+        }
+        session->meter_open = false;
+        session->session_Wh = elec->energy_Wh;
+    }
     session->elec = *elec;
     hear(&session->elec_heard, now_ms);
-    if (elec->energy_Wh != TAPER_ABSENT) {
-        session->session_Wh = elec->energy_Wh;
+}
+
+/* Number of the session in A, B or D. */
+static uint8_t session_of(const taper_message_t *message) {
+    switch (message->kind) {
+    case TAPER_MESSAGE_EV_PARAM_A: return message->as.ev_param_a.session;
+    case TAPER_MESSAGE_EV_PARAM_B: return message->as.ev_param_b.session;
+    default: return message->as.ev_param_d.session;
     }
 }
 
@@ -202,6 +249,9 @@ static void apply_parameters(taper_session_table_t *table, taper_session_t *sess
         break;
     }
     session->param_seen = (uint8_t)(session->param_seen | part);
+    if (session->awaited && part != PARAM_C && session_of(message) != session->used.a.session) {
+        taper_session_drop(table, session, now_ms);
+    }
     use_parameters(table, session, now_ms);
 }
 
@@ -214,10 +264,10 @@ static void apply_info(taper_session_table_t *table, taper_session_t *session,
     session->info_known = true;
     if (info->protocol_version != TAPER_PROTOCOL_VERSION &&
         (first || old.protocol_version != info->protocol_version)) {
-        note(table, session, TAPER_EVENT_VERSION, info->protocol_version);
+        taper_session_note(table, session, TAPER_EVENT_VERSION, info->protocol_version);
     }
     if (info->rotation == TAPER_ROTATION_UNKNOWN && (first || old.rotation != info->rotation)) {
-        note(table, session, TAPER_EVENT_ROTATION, 0);
+        taper_session_note(table, session, TAPER_EVENT_ROTATION, 0);
     }
 }
 
@@ -249,6 +299,7 @@ static void apply_time(taper_session_table_t *table, const taper_time_sync_t *ti
     }
     const uint32_t at_ms = now_ms - time->ms / table->time_scale;
     if (!table->clock_heard.heard) {
+        taper_session_end_restart(table, time->unix_s, at_ms);
         note_clock(table, 0);
     } else {
         const int64_t moved_s = clock_moved_s(table, time->unix_s, at_ms);
@@ -276,8 +327,8 @@ bool taper_session_apply_to(taper_session_table_t *table, uint8_t connector, con
     taper_session_t *session = &table->session[connector];
     switch (message->kind) {
     case TAPER_MESSAGE_EVSE_STATUS: apply_status(table, session, &message->as.evse_status, now_ms); break;
-    case TAPER_MESSAGE_EV_STATUS: apply_ev(session, &message->as.ev_status, now_ms); break;
-    case TAPER_MESSAGE_EVSE_ELEC: apply_elec(session, &message->as.evse_elec, now_ms); break;
+    case TAPER_MESSAGE_EV_STATUS: apply_ev(table, session, &message->as.ev_status, now_ms); break;
+    case TAPER_MESSAGE_EVSE_ELEC: apply_elec(table, session, &message->as.evse_elec, now_ms); break;
     case TAPER_MESSAGE_EVSE_INFO: apply_info(table, session, &message->as.evse_info); break;
     case TAPER_MESSAGE_EV_PARAM_A:
     case TAPER_MESSAGE_EV_PARAM_B:
@@ -306,7 +357,7 @@ static void note_loss(taper_session_table_t *table, taper_session_t *session, ui
     expire(&session->status_heard, now_ms, TAPER_EVSE_STATUS_TIMEOUT_ms);
     if (was_heard && !session->status_heard.heard) {
         session->lost = true;
-        note(table, session, TAPER_EVENT_CONNECTOR_LOST, 0);
+        taper_session_note(table, session, TAPER_EVENT_CONNECTOR_LOST, 0);
     }
 }
 
@@ -327,7 +378,7 @@ void taper_session_update(taper_session_table_t *table, uint32_t now_ms) {
         expire(&session->elec_heard, now_ms, TAPER_EVSE_ELEC_TIMEOUT_ms);
         if (taper_session_estimate(session, now_ms)) {
             taper_count(&table->soc_jumps);
-            note(table, session, TAPER_EVENT_SOC_JUMP, session->ev.soc_permille);
+            taper_session_note(table, session, TAPER_EVENT_SOC_JUMP, session->ev.soc_permille);
         }
         note_activity(table, i, now_ms);
     }

@@ -104,6 +104,9 @@ bool taper_session_estimate(taper_session_t *session, uint32_t now_ms) {
     const int32_t capacity_Wh = taper_session_capacity_Wh(session);
     const bool soc_is_new = session->soc_is_new && taper_session_soc_is_fresh(session, now_ms);
     session->soc_is_new = false;
+    if (session->awaited) {
+        return false; /* it stays as it was kept */
+    }
     if (capacity_Wh == 0) {
         session->stored_Wh = TAPER_ABSENT;
         return false;

@@ -56,6 +56,7 @@ typedef struct {
     int32_t unknown_mA;   /**< what a controller before this one may have told it; 0: nothing any more */
     uint32_t unknown_until_ms; /**< end of that, with the vehicle's reaction */
     uint8_t first_echo;      /**< + 1; may still be of that time. 0: none heard; UINT8_MAX: echoes are ours */
+    bool accepts;            /**< it has accepted a setpoint of ours since its vehicle came */
     int32_t drawn_mA;        /**< measured above what it may; 0: not so */
     uint32_t drawn_until_ms; /**< for how long that holds without another report */
     int32_t last_mA;         /**< the setpoint sent last */
@@ -96,6 +97,12 @@ void taper_ledger_hear(taper_ledger_t *ledger, uint8_t connector, const taper_ev
 
 /** Close what ran out by `now_ms`. Call it once per tick and poll. Cost: O(connectors x TAPER_LEDGER_SETPOINTS). */
 void taper_ledger_update(taper_ledger_t *ledger, uint32_t now_ms);
+
+/** Whether a connector is known to have accepted a setpoint of ours, and so to be in the session that it was for. */
+bool taper_ledger_is_accepted(const taper_ledger_t *ledger, uint8_t connector);
+
+/** Whether what an earlier controller told some connector may still be in force. Cost: O(connectors). */
+bool taper_ledger_is_starting(const taper_ledger_t *ledger);
 
 /** What a connector may draw per phase, by all that is open, and what it is seen to draw [mA]. */
 int32_t taper_ledger_may_mA(const taper_ledger_t *ledger, uint8_t connector);

@@ -27,6 +27,7 @@
 #include "taper/port.h"
 #include "taper/rows.h"
 #include "taper/session.h"
+#include "taper/settings.h"
 #include "taper/shape.h"
 #include "taper/supervisor.h"
 #include "taper/transfers.h"
@@ -52,11 +53,13 @@ typedef struct {
     const taper_port_t *port;
     const taper_solver_t *solver; /**< generated for this station; NULL: no planner, charge by fallback */
     const taper_policy_t *policy; /**< NULL: the planner */
-    uint16_t iterations_per_tick; /**< solver iterations in a control tick, >= TAPER_MIN_SLICE */
+    uint16_t iterations_per_tick; /**< solver iterations in a control tick, >= 1; fewer than TAPER_MIN_SLICE
+                                       bound the work of a tick: see taper_planner_run() */
     /** Simulation: so many times faster than the bus run batteries, departures, the wall clock and the planning steps,
         while periods and timeouts of the bus stay as they are. `tick_ms` of the configuration counts in their time.
         0 is 1, a real station. At most TAPER_MAX_TIME_SCALE, and `tick_ms`. */
     uint16_t time_scale;
+    taper_stored_t settings_found; /**< by taper_settings_load(), for the event log; 0 if there are none */
 } taper_station_options_t;
 
 #define TAPER_MAX_TIME_SCALE 1000
@@ -141,12 +144,17 @@ typedef struct {
     int32_t need_Wh;    /**< what it wanted then */
 } taper_prospect_t;
 
-/** What survives a restart. Written whole, two copies in turn. */
+/** What is in the port's store to survive a restart (record.c), written whole, two copies in turn. */
 typedef struct {
-    uint32_t sequence;
-    int32_t failsafe_W; /**< the gateway's last word on it, or absent: the description's holds */
+    uint32_t sequence;   /**< of the newest record */
+    uint8_t next_copy;   /**< to be written next */
+    bool is_due;         /**< it is written between this tick and the next */
+    bool has_sessions;   /**< as it was written last, and so the following: */
+    int32_t failsafe_W;  /**< the gateway's last word on it, or absent: the description's holds */
+    uint32_t changes;    /**< of the session table */
+    uint32_t switches;   /**< of the allocator */
+    uint32_t written_ms; /**< when that was, or was tried */
     uint32_t starts;
-    uint32_t crc32; /**< over the rest */
 } taper_station_record_t;
 
 typedef struct {
@@ -164,7 +172,10 @@ typedef struct {
     taper_self_t self;     /**< of this controller */
     taper_stranger_t stranger[TAPER_STRANGERS];
     taper_transfers_t transfers;
-    taper_transfer_content_t incoming; /**< being taken over from a transfer */
+    union {
+        taper_transfer_content_t incoming;      /**< being taken over from a transfer */
+        uint8_t record[TAPER_STORE_RECORD_MAX]; /**< being read or written */
+    } scratch;                                  /**< nothing of it outlives a call */
     taper_trouble_t refused_transfers;
     taper_event_log_t events;
     taper_e2e_receiver_t connector_e2e[TAPER_MAX_CONNECTORS][TAPER_CONNECTOR_RECEIVERS];
@@ -174,11 +185,12 @@ typedef struct {
     taper_bus_guard_t bus[TAPER_MAX_BUSES];
     taper_alarm_t alarm[TAPER_ALARMS];
     taper_station_record_t record;
-    uint8_t record_copy; /**< the copy to write next */
-    uint32_t record_ms;  /**< of the last write */
-    bool rival_heard;    /**< a second controller speaks */
-    uint32_t rival_ms;   /**< when it was last heard */
-    bool started;        /**< there was a step or a poll: the ledger has begun */
+    bool identifier_kept[TAPER_MAX_CONNECTORS]; /**< told before a restart, and not since */
+    bool turn_awaits[TAPER_MAX_CONNECTORS];     /**< for its session: the turn that was kept */
+    taper_turn_kept_t turn_kept[TAPER_MAX_CONNECTORS];
+    bool rival_heard;  /**< a second controller speaks */
+    uint32_t rival_ms; /**< when it was last heard */
+    bool started;      /**< there was a step or a poll: the ledger has begun */
     bool stopped;
     uint8_t setpoint_counter[TAPER_MAX_CONNECTORS];
     uint8_t plan_counter[TAPER_MAX_CONNECTORS];
@@ -222,7 +234,8 @@ typedef struct {
 } taper_station_t;
 
 /**
- * Bring the station up in mode INIT, with what the port's store has kept.
+ * Bring the station up in mode INIT, with what the port's store has kept. Sessions from before count, and get current,
+ * once their connectors have confirmed them.
  * @return TAPER_ERR_ARGUMENT for a NULL or out-of-range option, TAPER_ERR_CONFIG for a station description that
  *         contradicts itself or is larger than this image's sizes. The station must then not be stepped.
  */

@@ -18,7 +18,10 @@ typedef struct taper_solver taper_solver_t;
 
 /** Iterations after which a problem that has not converged is given up. */
 #define TAPER_MAX_ITERATIONS 500
-/** Slices are whole multiples of this: the solver looks for convergence every so many iterations. */
+/**
+ * The planner looks for convergence every so many iterations. Longer slices are whole multiples of this. Shorter ones are for
+ * a controller that must bound the work of a tick: see taper_planner_run().
+ */
 #define TAPER_MIN_SLICE 10
 
 /** What is thought of the solver's last answer. On the bus in CTRL_STATUS. */
@@ -34,12 +37,22 @@ typedef enum {
     TAPER_VERDICT_OFF = 8,        /**< not asked: see taper_health_t */
 } taper_verdict_t;
 
+/** What a problem being solved needs next. Each one but the iterations may hold one factorisation. */
+typedef enum {
+    TAPER_WORK_RESET,    /**< the penalty of a fresh solver */
+    TAPER_WORK_MATRICES, /**< values of the matrices */
+    TAPER_WORK_VECTORS,  /**< cost, bounds and starting point */
+    TAPER_WORK_ITERATIONS,
+    TAPER_WORK_PENALTY, /**< another penalty */
+} taper_work_t;
+
 typedef struct {
     const taper_solver_t *solver;
     taper_horizon_t horizon; /**< the problem being solved */
     taper_verdict_t verdict;
+    taper_work_t next;
     uint16_t iterations;                   /**< spent on the present problem */
-    uint8_t slices;                        /**< of the present problem */
+    uint16_t slices;                       /**< of the present problem */
     uint32_t started_ms;                   /**< time of the snapshot that the problem is for */
     uint8_t session[TAPER_MAX_CONNECTORS]; /**< whose trajectory the warm start holds; 0: nobody's */
     bool matrix_is_current;                /**< the solver's factorisation is that of its matrices' values */
@@ -55,17 +68,21 @@ taper_status_t taper_planner_init(taper_planner_t *planner, const taper_solver_t
 
 /**
  * State a new problem. The last usable answer, moved on in time, is the starting point; after a problem that was dropped
- * or had no usable answer, the solver starts from nothing.
- * `course` as in taper_horizon_build(). Cost: O(rows), and one or two factorisations.
+ * or had no usable answer, the solver starts from nothing. The solver does not know of it before the next slice.
+ * `course` as in taper_horizon_build(). Cost: that of taper_horizon_build(), and O(rows).
  */
 void taper_planner_start(taper_planner_t *planner, const taper_snapshot_t *snapshot,
                          const taper_course_t *course);
 
 /**
- * Work one slice of at most `iterations` on the present problem, rounded down to a multiple of TAPER_MIN_SLICE but at
- * least that. The steps taken, and so the answer, do not depend on how a solve is sliced.
- * @return the verdict; TAPER_VERDICT_SOLVING: call again. Cost: `iterations` x cost of an iteration
- * (docs/results.md), and a factorisation for every 50 of them.
+ * Work one slice of at most `iterations` on the present problem. The steps taken, and so the answer, do not depend on how a
+ * solve is sliced.
+ *
+ * From TAPER_MIN_SLICE on, `iterations` is rounded down to a multiple of it, and factorisations come on top: up to three
+ * where a problem begins, and one after every 50 iterations. Below, a slice is short: it holds either at most `iterations`
+ * (at least 1) or one factorisation at most, and a problem takes three to four slices more than its iterations need.
+ *
+ * @return the verdict; TAPER_VERDICT_SOLVING: call again. Cost: docs/budgets.md has it, of an iteration and of slices.
  */
 taper_verdict_t taper_planner_run(taper_planner_t *planner, uint16_t iterations);
 

@@ -9,9 +9,20 @@
 #include <stdint.h>
 
 #include "taper/frame.h"
+#include "taper/sizes.h"
 
-/** Copies of a record that the non-volatile store holds. */
+/** What the non-volatile store holds: a record for each area, so that one that is written often never harms another. */
+typedef enum {
+    TAPER_STORE_STATION = 0,  /**< what changes while it runs: sessions, the failsafe limit told, starts */
+    TAPER_STORE_SETTINGS = 1, /**< what was set at the site (settings.h); written when somebody sets it */
+    TAPER_STORE_AREAS
+} taper_store_area_t;
+
+/** Copies of each record: a write harms one of them at most. */
 #define TAPER_STORE_COPIES 2u
+
+/** The longest record [bytes]: of the area TAPER_STORE_STATION of an image for its largest station. */
+#define TAPER_STORE_RECORD_MAX (64u + 104u * TAPER_MAX_CONNECTORS)
 
 typedef struct {
     void *context;
@@ -22,8 +33,8 @@ typedef struct {
      */
     bool (*receive)(void *context, taper_frame_t *frame);
 
-    /** Queue a frame for sending. @return false: the queue is full or the bus is off, the frame was not taken.
-        Must not block. */
+    /** Queue a frame for sending. @return false: the queue is full, the bus is off, or no bus carries it (a `bus` that is
+        not there, an identifier of more than 11 bits, a length above 8); the frame was not taken. Must not block. */
     bool (*send)(void *context, const taper_frame_t *frame);
 
     /** Called once at the end of every control tick that finished. NULL: the board has no watchdog. */
@@ -42,12 +53,13 @@ typedef struct {
     uint32_t (*receive_overflows)(void *context);
 
     /**
-     * Read or write a whole copy (0..TAPER_STORE_COPIES-1) of the station's record in non-volatile memory. A write that
-     * power-off cuts short may leave that copy torn, and no other. @return false: it could not be done, or was never
-     * written. Both NULL: no store.
+     * Read the first `length` bytes of a copy (0..TAPER_STORE_COPIES-1) of an area's record (taper_store_area_t) in
+     * non-volatile memory, or write it, from its first byte on; 1..TAPER_STORE_RECORD_MAX. A read may be longer or shorter
+     * than what was written: what lies beyond is of no account. A write that power-off cuts short may leave that copy
+     * torn, and no other of any area. @return false: it could not be done, or was never written. Both NULL: no store.
      */
-    bool (*store_read)(void *context, unsigned copy, void *data, uint32_t length);
-    bool (*store_write)(void *context, unsigned copy, const void *data, uint32_t length);
+    bool (*store_read)(void *context, unsigned area, unsigned copy, void *data, uint32_t length);
+    bool (*store_write)(void *context, unsigned area, unsigned copy, const void *data, uint32_t length);
 } taper_port_t;
 
 #endif

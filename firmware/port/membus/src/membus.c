@@ -5,6 +5,8 @@
 
 #include "membus_internal.h"
 
+#define LARGEST_ID 0x7FFu
+
 _Static_assert((TAPER_MEMBUS_DEPTH & (TAPER_MEMBUS_DEPTH - 1u)) == 0u,
                "free-running indices wrap at a power of two");
 
@@ -72,9 +74,13 @@ static bool station_receive(void *context, taper_frame_t *frame) {
     return take(&bus->to_station, frame);
 }
 
+static bool is_carried(const taper_frame_t *frame) {
+    return frame->bus < TAPER_MAX_BUSES && frame->id <= LARGEST_ID && frame->length <= TAPER_FRAME_LENGTH;
+}
+
 static bool station_send(void *context, const taper_frame_t *frame) {
     taper_membus_t *bus = context;
-    return !is_off(bus, frame->bus) && put(&bus->to_world, frame);
+    return is_carried(frame) && !is_off(bus, frame->bus) && put(&bus->to_world, frame);
 }
 
 static void restart(void *context, uint8_t can_bus) {

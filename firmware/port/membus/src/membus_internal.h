@@ -18,7 +18,7 @@ bool taper_membus_next_of_flood(taper_membus_injector_t *injector, taper_frame_t
 
 /** The store's part of the station's port. */
 void taper_membus_store_init(taper_membus_t *bus);
-bool taper_membus_store_read(void *context, unsigned copy, void *data, uint32_t length);
-bool taper_membus_store_write(void *context, unsigned copy, const void *data, uint32_t length);
+bool taper_membus_store_read(void *context, unsigned area, unsigned copy, void *data, uint32_t length);
+bool taper_membus_store_write(void *context, unsigned area, unsigned copy, const void *data, uint32_t length);
 
 #endif

@@ -99,6 +99,7 @@ taper_slcan_message_t taper_drive_done(taper_drive_kind_t of, const taper_drive_
     put(&word, &at, done->hands_over, 1);
     put(&word, &at, done->is_settled, 1);
     put(&word, &at, done->watchdog_kicked, 1);
+    put(&word, &at, done->planned, 1);
     return make(TAPER_DRIVE_DONE, (uint8_t)of, word, 8);
 }
 
@@ -115,6 +116,7 @@ bool taper_drive_get_done(const taper_slcan_message_t *message, taper_drive_done
     done->hands_over = get(word, &at, 1) != 0;
     done->is_settled = get(word, &at, 1) != 0;
     done->watchdog_kicked = get(word, &at, 1) != 0;
+    done->planned = get(word, &at, 1) != 0;
     return true;
 }
 

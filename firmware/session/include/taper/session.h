@@ -11,6 +11,10 @@
  * A session begins when a connector reports a vehicle (control pilot B, C or D) and EV_PARAM A, B and C agree on their
  * revision, A and B on the session number. It ends when the connector reports no vehicle; another session number on the
  * same connector begins a new one. A new revision of the parameters is used once it is whole; until then the old one.
+ *
+ * Over a restart the caller keeps what the bus does not tell again, or not soon (taper_session_kept_t). A session from before
+ * counts only when its connector confirms its number: by its parameters, or by accepting a setpoint for that session. If it
+ * has another number, a battery or a SOC at plug-in that differs, or a meter that shows less, it was another vehicle's.
  */
 #ifndef TAPER_SESSION_H
 #define TAPER_SESSION_H
@@ -79,7 +83,23 @@ typedef struct {
     int32_t jump_permille;      /**< last SOC that was not believed */
     uint8_t jump_count;         /**< reports that agreed on it, in a row */
     bool soc_is_new;            /**< an EV_STATUS came since the last update */
+    bool kept;                  /**< it began before a restart, and so the following: */
+    bool awaited;    /**< kept from before a restart, and not confirmed yet: `used`, but nobody's demand */
+    bool unproved;   /**< kept from before a restart, and its parameters were not told since */
+    bool meter_open; /**< and its meter was not heard since */
+    bool stay_open;  /**< and how long the restart took is not known: `plugged_in_ms` is too late by that */
 } taper_session_t;
+
+/** What of a session has to outlive a restart. */
+typedef struct {
+    taper_ev_params_t used; /**< revision and session of A stand for those of the others */
+    uint8_t error; /**< of the last EV_STATUS, and what it asked for: a vehicle that is done falls asleep */
+    bool complete, pause_requested, stop_requested;
+    int32_t session_Wh; /**< as in taper_session_t */
+    int32_t stored_Wh;
+    int32_t anchor_Wh;
+    uint32_t stay_s; /**< since it was plugged in, in the world's time */
+} taper_session_kept_t;
 
 typedef struct {
     const taper_station_config_t *config;
@@ -92,6 +112,10 @@ typedef struct {
     uint32_t unix_s;           /**< at `clock_heard.at_ms` */
     taper_heard_t clock_heard; /**< the last TIME_SYNC with quality above 0; held over for ever */
     uint32_t revision;         /**< changes with whatever should make the planner think again */
+    uint32_t
+        changes; /**< changes with whatever of taper_session_kept_t should be kept soon: all but energy and time */
+    uint32_t kept_unix_s; /**< wall clock at `kept_at_ms`, had the restart taken no time; 0: not known */
+    uint32_t kept_at_ms;
 } taper_session_table_t;
 
 /** Empty the table, without a log, time scale 1. `config` must outlive it. */
@@ -142,7 +166,38 @@ uint32_t taper_session_unix_s(const taper_session_table_t *table, uint32_t now_m
 /** Index of the connector at (`bus`, `node`), or -1. */
 int taper_session_connector(const taper_station_config_t *config, uint8_t bus, uint8_t node);
 
-/** Wire number of the session on a connector, for SETPOINT; 0 if there is none. */
+/** Wire number of the session on a connector, for SETPOINT; 0 if there is none. Also of one that is awaited. */
 uint8_t taper_session_number(const taper_session_table_t *table, uint8_t connector);
+
+/** What has to outlive a restart. @return false: there is no session, nor one awaited. Cost: constant. */
+bool taper_session_keep(const taper_session_table_t *table, uint8_t connector, uint32_t now_ms,
+                        taper_session_kept_t *kept);
+
+/**
+ * Await a session that was kept, on a table that has heard nothing yet; its time is 0. Quantities out of the range of their
+ * messages are not believed. @return false: nothing of it is used. Cost: constant.
+ */
+bool taper_session_restore(taper_session_table_t *table, uint8_t connector, const taper_session_kept_t *kept);
+
+/**
+ * The clock starts: it is `now_ms`, and the sessions were kept at `unix_s` (0: not known). How long the restart took becomes
+ * known with the first TIME_SYNC; until then, and if either clock is not known, it counts as no time. Cost: O(connectors).
+ */
+void taper_session_start_clock(taper_session_table_t *table, uint32_t unix_s, uint32_t now_ms);
+
+/** World's time since the sessions were kept; since the start, as long as either wall clock is not known [s]. */
+uint32_t taper_session_since_kept_s(const taper_session_table_t *table, uint32_t now_ms);
+
+/** The wall clock as far as it is known [Unix s]: had the restart taken no time, until it was set. 0: not known. */
+uint32_t taper_session_kept_unix_s(const taper_session_table_t *table, uint32_t now_ms);
+
+/** The connector has accepted a setpoint for the number of its session: one that is awaited is there. Cost: constant. */
+void taper_session_confirm(taper_session_table_t *table, uint8_t connector);
+
+/** Whether the vehicle's session began before a restart, or is awaited from there. */
+bool taper_session_is_kept(const taper_session_table_t *table, uint8_t connector);
+
+/** Whether the connector was not heard since the start, or its vehicle may be one that is awaited. */
+bool taper_session_may_be_there(const taper_session_table_t *table, uint8_t connector);
 
 #endif

@@ -17,8 +17,6 @@
 
 /** Frames one direction holds: a tick's worth from every node of the largest station. A power of two. */
 #define TAPER_MEMBUS_DEPTH 2048u
-/** Longest record that the store takes [bytes]. */
-#define TAPER_MEMBUS_RECORD 256u
 
 /** Faults of one direction (`taper/membus_faults.h`). */
 typedef struct taper_membus_injector taper_membus_injector_t;
@@ -39,16 +37,16 @@ typedef struct {
     uint32_t lost;             /**< frames from the world that nobody heard; saturating */
 } taper_membus_controller_t;
 
-/** One copy of the station's record. Memory that was never written reads as 0xFF. */
+/** One copy of a record. Memory that was never written reads as 0xFF. */
 typedef struct {
-    uint8_t data[TAPER_MEMBUS_RECORD];
+    uint8_t data[TAPER_STORE_RECORD_MAX];
     bool written;
 } taper_membus_copy_t;
 
 typedef struct {
     taper_membus_queue_t to_station, to_world;
     taper_membus_controller_t controller[TAPER_MAX_BUSES];
-    taper_membus_copy_t store[TAPER_STORE_COPIES];
+    taper_membus_copy_t store[TAPER_STORE_AREAS][TAPER_STORE_COPIES];
     bool tear_next; /**< the next write stops after `tear_after` bytes */
     uint32_t tear_after;
     uint32_t store_writes; /**< tried, ever; saturating */
@@ -91,7 +89,7 @@ void taper_membus_bus_on(taper_membus_t *bus, uint8_t can_bus);
 /** Power goes during the next write, after `bytes` of it: the copy is left torn and the write answers false. */
 void taper_membus_tear_next_write(taper_membus_t *bus, uint32_t bytes);
 
-/** One bit (0..8 * TAPER_MEMBUS_RECORD - 1) of a copy (0..TAPER_STORE_COPIES-1) flips; others are ignored. */
-void taper_membus_rot(taper_membus_t *bus, unsigned copy, uint32_t bit);
+/** One bit (0..8 * TAPER_STORE_RECORD_MAX - 1) of a copy (0..TAPER_STORE_COPIES-1) of an area flips; others are ignored. */
+void taper_membus_rot(taper_membus_t *bus, unsigned area, unsigned copy, uint32_t bit);
 
 #endif

@@ -24,7 +24,7 @@
 /** What is asked, from 1, and what is answered, from 0x81. */
 typedef enum {
     TAPER_DRIVE_SETUP =
-        0x01, /**< a new station with the settings that follow; DONE says whether it was taken */
+        0x01, /**< a new station with the settings that follow and an empty store; DONE says whether it was taken */
     TAPER_DRIVE_TIME = 0x03,    /**< u32: reception time of the frames that follow [ms]; no answer */
     TAPER_DRIVE_STEP = 0x04,    /**< u32: now [ms]; DONE */
     TAPER_DRIVE_POLL = 0x05,    /**< u32: now [ms]; DONE */
@@ -36,7 +36,7 @@ typedef enum {
         0x0A, /**< the board resets; what is in its store stays, the channel stays open; HELLO when it is up */
     TAPER_DRIVE_EXIT = 0x0B, /**< index: exit status of the emulator; no answer */
     TAPER_DRIVE_RESUME =
-        0x0C, /**< a new station with the settings of the store, instead of SETUP after a reset; DONE */
+        0x0C, /**< a new station with the settings of the last SETUP, and what the store has kept, after a reset; DONE */
     TAPER_DRIVE_DONE = 0x81,   /**< taper_drive_done_t; index: the kind that it answers */
     TAPER_DRIVE_LOOKED = 0x82, /**< index: connector; a taper_outlook_t (taper_drive_looked()) */
     TAPER_DRIVE_VALUE = 0x83,  /**< index as asked; u32 */
@@ -55,6 +55,7 @@ typedef enum {
     TAPER_DRIVE_STORE_WRITES,     /**< since the start of the image */
     TAPER_DRIVE_BUILT_FOR,        /**< connectors of the board's station */
     TAPER_DRIVE_NAME,             /**< CRC-32 of the name of the board's station */
+    TAPER_DRIVE_HAS_PLANNER,      /**< 1: the image has one */
     TAPER_DRIVE_FIGURES
 } taper_drive_figure_t;
 
@@ -79,6 +80,7 @@ typedef struct {
     bool hands_over;       /**< taper_station_hands_over() */
     bool is_settled;       /**< taper_station_is_settled() */
     bool watchdog_kicked;  /**< in this call */
+    bool planned;          /**< the planner stated a problem or worked on one in this call */
     uint8_t mode;          /**< taper_mode_t */
     uint16_t plans;        /**< TAPER_COUNTER_PLANS, its low 16 bits */
     uint32_t instructions; /**< of the call, to about 40, without frames going over the wire; 0: not known */

@@ -1,0 +1,5 @@
+#include "taper/version.h"
+
+const char *taper_version(void) {
+    return TAPER_VERSION;
+}
