@@ -183,14 +183,14 @@ bool taper_guard_passes(const taper_station_config_t *config, const taper_snapsh
         const taper_booking_t booking = booking_of(config, &snapshot->demand[i], i);
         add_current(&load[config->connectors[i].group], &booking, current_mA);
     }
-    /* No station has more groups than the image, but where that has one the compiler would see the others beyond it. */
-    const int32_t groups = taper_min_i32(config->group_count, TAPER_MAX_GROUPS);
-    for (int32_t k = groups; k-- > 1;) { /* children stand behind their parents */
-        if (!load_passes(&config->groups[k], &load[k], as_described)) {
+    const int32_t groups = taper_min_i32(config->group_count, TAPER_MAX_GROUPS); /* config_check.h: it is */
+    for (int32_t k = groups; k-- > 0;) { /* children stand behind their parents */
+        if (!load_passes(&config->groups[k], &load[k], k == 0 ? supply->phase_mA : as_described)) {
             return false;
         }
-        add_load(&load[config->groups[k].parent], &load[k]);
+        if (k > 0) {
+            add_load(&load[config->groups[k].parent], &load[k]);
+        }
     }
-    return load_passes(&config->groups[0], &load[0], supply->phase_mA) &&
-           load[0].power_mW <= (int64_t)taper_max_i32(supply->site_W, 0) * 1000;
+    return load[0].power_mW <= (int64_t)taper_max_i32(supply->site_W, 0) * 1000;
 }
