@@ -252,8 +252,10 @@ void taper_station_step(taper_station_t *station, uint32_t now_ms);
 void taper_station_poll(taper_station_t *station, uint32_t now_ms);
 
 /**
- * Take in the frames that have come, and do nothing else. A step and a poll begin with it. A board that calls it as frames come
- * has them out of the way when the tick is due; what the station does is the same. Cost: constant for each frame.
+ * Do what can be done ahead of a tick: take in the frames that have come, and write the record of what survives a restart, if
+ * it is due. Nothing is sent. A board that calls it as frames come has them out of the way when the tick is due; the frames that
+ * the station sends are the same. A step and a poll do all of it themselves. Cost: constant for each frame; every 10 s at
+ * most O(connectors).
  */
 void taper_station_hear(taper_station_t *station, uint32_t now_ms);
 
