@@ -12,6 +12,12 @@
 #include "taper/port.h"
 #include "whole_file.h"
 
+/** Whether a record has such a place, and fits into it. */
+static bool fits(unsigned area, unsigned copy, uint32_t length) {
+    errno = EINVAL;
+    return area < TAPER_STORE_AREAS && copy < TAPER_STORE_COPIES && length <= TAPER_STORE_RECORD_MAX;
+}
+
 /** Name of a copy's file. @return false, with errno, if that is too long. */
 static bool name(char text[PATH_MAX], const char *path, unsigned area, unsigned copy) {
     static const char *const middle[TAPER_STORE_AREAS] = {
@@ -44,7 +50,8 @@ static bool read_all(int fd, unsigned char *data, uint32_t length) {
 
 bool taper_store_read(const char *path, unsigned area, unsigned copy, void *data, uint32_t length) {
     char file[PATH_MAX];
-    const int fd = name(file, path, area, copy) ? open(file, O_RDONLY | O_CLOEXEC) : -1;
+    const bool is_there = fits(area, copy, length) && name(file, path, area, copy);
+    const int fd = is_there ? open(file, O_RDONLY | O_CLOEXEC) : -1;
     if (fd < 0) {
         return false;
     }
@@ -55,5 +62,6 @@ bool taper_store_read(const char *path, unsigned area, unsigned copy, void *data
 
 bool taper_store_write(const char *path, unsigned area, unsigned copy, const void *data, uint32_t length) {
     char file[PATH_MAX];
-    return name(file, path, area, copy) && taper_whole_file_write(file, data, length, 0600);
+    return fits(area, copy, length) && name(file, path, area, copy) &&
+           taper_whole_file_write(file, data, length, 0600);
 }

@@ -12,7 +12,8 @@ typedef union {
 
 void mps2_reset_entry(void);
 void mps2_systick_interrupt(void);
-void mps2_uart_interrupt(void);
+void mps2_uart_receive_interrupt(void);
+void mps2_uart_transmit_interrupt(void);
 int main(void);
 
 #define FAULT        {.handler = mps2_fault_entry}
@@ -34,8 +35,8 @@ __attribute__((section(".vectors"), used)) static const vector_t vectors[16 + MP
     FAULT,
     FAULT, // PendSV
     {.handler = mps2_systick_interrupt},
-    {.handler = mps2_uart_interrupt}, // receive
-    {.handler = mps2_uart_interrupt}, // transmit
+    {.handler = mps2_uart_receive_interrupt},
+    {.handler = mps2_uart_transmit_interrupt},
     FAULT,
     FAULT,
     FOUR_FAULTS,

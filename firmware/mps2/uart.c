@@ -14,7 +14,10 @@ _Static_assert((RING & (RING - 1)) == 0, "free-running indices");
 static uint8_t ring[RING];
 static volatile uint32_t head, tail; // free-running: put at head, taken at tail
 
-void mps2_uart_interrupt(void);
+static volatile bool is_held; // the ring is full, and a byte waits in the UART
+
+void mps2_uart_receive_interrupt(void);
+void mps2_uart_transmit_interrupt(void);
 
 void mps2_uart_start(void) {
     MPS2_UART0->baud_divider = BAUD_DIVIDER;
@@ -22,23 +25,37 @@ void mps2_uart_start(void) {
     MPS2_NVIC_ENABLE = 1u << MPS2_IRQ_UART0_RX | 1u << MPS2_IRQ_UART0_TX;
 }
 
-/** Into the ring, if there is a byte and room for it. */
+/** Every access to the UART costs an emulator far more than an instruction: there are two for a byte. */
 static void take_byte(void) {
-    if ((MPS2_UART0->state & MPS2_UART_RX_FULL) != 0 && head - tail < RING) {
-        ring[head % RING] = (uint8_t)MPS2_UART0->data;
-        head++;
+    ring[head % RING] = (uint8_t)MPS2_UART0->data;
+    head++;
+}
+
+void mps2_uart_receive_interrupt(void) {
+    MPS2_UART0->interrupts = MPS2_UART_RX_EVENT;
+    if (head - tail < RING) {
+        take_byte();
+    } else {
+        is_held = true;
     }
 }
 
 /** That the UART can send again is only told to end a wait. */
-void mps2_uart_interrupt(void) {
-    MPS2_UART0->interrupts = MPS2_UART_RX_EVENT | MPS2_UART_TX_EVENT;
+void mps2_uart_transmit_interrupt(void) {
+    MPS2_UART0->interrupts = MPS2_UART_TX_EVENT;
     MPS2_UART0->control &= ~MPS2_UART_TX_IRQ;
-    take_byte();
 }
 
 bool mps2_uart_has_received(void) {
     return head != tail;
+}
+
+/** The byte that found the ring full: there was no other interrupt since. */
+static void take_held_byte(void) {
+    const uint32_t state = mps2_interrupts_off();
+    is_held = false;
+    take_byte();
+    mps2_interrupts_restore(state);
 }
 
 static size_t receive(void *context, uint8_t *data, size_t size) {
@@ -48,10 +65,9 @@ static size_t receive(void *context, uint8_t *data, size_t size) {
         data[count++] = ring[tail % RING];
         tail++;
     }
-    // A byte that found the ring full waits in the UART, without another interrupt.
-    const uint32_t state = mps2_interrupts_off();
-    take_byte();
-    mps2_interrupts_restore(state);
+    if (is_held && count > 0) {
+        take_held_byte();
+    }
     return count;
 }
 

@@ -9,6 +9,8 @@
 
 /** An emulator that is just starting does not listen yet. */
 #define CONNECT_ms 3000u
+/** No station sends more in one call. */
+#define MOST_FRAMES 4096u
 /** A board that is left takes what was sent to it, or it does not matter. */
 #define CLOSE_ms 1000u
 
@@ -22,11 +24,16 @@ bool sim_board_fail(const sim_board_talk_t *talk, const char *format, ...) {
     return false;
 }
 
-static void keep_frame(sim_board_talk_t *talk, const taper_slcan_message_t *message) {
+/** @return false, after one line: the board sends without end. */
+static bool keep_frame(sim_board_talk_t *talk, const taper_slcan_message_t *message, const char *what) {
+    if (talk->count == MOST_FRAMES) {
+        return sim_board_fail(talk, "it sends more than %u frames, where %s was awaited", MOST_FRAMES, what);
+    }
     taper_frame_t frame = {.id = (uint16_t)message->id, .length = message->length};
     memcpy(frame.data, message->data, sizeof frame.data);
     talk->frame = sim_grow(talk->frame, &talk->room, talk->count + 1, sizeof *talk->frame);
     talk->frame[talk->count++] = frame;
+    return true;
 }
 
 void sim_board_drop_frames(sim_board_talk_t *talk) {
@@ -76,8 +83,9 @@ static bool next_message(sim_board_talk_t *talk, const char *what, taper_slcan_m
         if (event == SIM_SLCAN_MESSAGE && taper_drive_split(message, kind, index)) {
             return true;
         }
-        if (event == SIM_SLCAN_MESSAGE && !message->is_extended && !message->is_remote) {
-            keep_frame(talk, message);
+        if (event == SIM_SLCAN_MESSAGE && !message->is_extended && !message->is_remote &&
+            !keep_frame(talk, message, what)) {
+            return false;
         }
     }
 }

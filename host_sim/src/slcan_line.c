@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "memory.h"
+#include "progress.h"
 
 /** So much waits at most before the other side is offered it. */
 #define OFFER 2048u
@@ -107,8 +108,10 @@ sim_slcan_event_t sim_slcan_next(sim_slcan_line_t *line, taper_slcan_message_t *
 }
 
 void sim_slcan_close(sim_slcan_line_t *line, unsigned timeout_ms) {
+    const uint64_t end_us = sim_now_us() + UINT64_C(1000) * timeout_ms;
     offer(line);
-    while (line->out_length > 0 && !line->tcp.is_broken && tcp_stream_wait(&line->tcp, true, timeout_ms)) {
+    while (line->out_length > 0 && !line->tcp.is_broken && sim_now_us() < end_us) {
+        (void)tcp_stream_wait(&line->tcp, true, timeout_ms);
         (void)read_more(line); // the other side takes nothing while its answers are left lying
         offer(line);
     }

@@ -160,19 +160,24 @@ static bool solve(sim_link_t *link, sim_solve_t *finished) {
     return true;
 }
 
+static bool await_outlook(board_t *board, uint8_t connector, taper_outlook_t *outlook) {
+    taper_slcan_message_t answer;
+    return sim_board_await(&board->talk, TAPER_DRIVE_LOOKED, connector, "the outlook of a connector",
+                           &answer) &&
+           (taper_drive_get_looked(&answer, outlook) ||
+            sim_board_fail(&board->talk, "the outlook of connector %u is cut short", connector + 1u));
+}
+
 static bool look(sim_link_t *link, const bool wanted[TAPER_MAX_CONNECTORS],
                  taper_outlook_t outlook[TAPER_MAX_CONNECTORS]) {
     board_t *board = (board_t *)link;
-    taper_slcan_message_t answer;
     for (unsigned i = 0; i < TAPER_MAX_CONNECTORS; i++) {
         if (wanted[i]) {
             say(board, taper_drive_plain(TAPER_DRIVE_LOOK, (uint8_t)i));
         }
     }
     for (unsigned i = 0; i < TAPER_MAX_CONNECTORS; i++) {
-        if (wanted[i] && (!sim_board_await(&board->talk, TAPER_DRIVE_LOOKED, (uint8_t)i,
-                                           "the outlook of a connector", &answer) ||
-                          !taper_drive_get_looked(&answer, &outlook[i]))) {
+        if (wanted[i] && !await_outlook(board, (uint8_t)i, &outlook[i])) {
             return false;
         }
     }

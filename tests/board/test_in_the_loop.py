@@ -4,16 +4,19 @@ Both have 32-bit floats. With TAPER_LONG=1 the paper's day and a whole real week
 """
 
 import os
+import time
 from pathlib import Path
 
 import pytest
 
 from equality import HOST, cases_of
+from taperlib.drive import POLL, Drive
 from taperlib.equality import Case, Outcome, Target, compare, run
 
 STATION = os.environ.get("TAPER_STATION", "")
 CASES = cases_of(STATION, long=os.environ.get("TAPER_LONG") == "1")
 NAMES = [case.name for case in CASES]
+WATCHED_S = 2.0  # a call that takes longer is a fault
 
 
 @pytest.fixture(scope="module")
@@ -53,3 +56,10 @@ def test_instructions_and_stack_are_measured(runs: tuple[Case, Outcome, Outcome]
     assert 0 < per_tick["p50"] <= per_tick["max"]
     assert 0 < per_tick["max_without_slice"] < per_tick["max"]
     assert 0 < measured["stack_used_b"] < measured["stack_size_b"]
+
+
+def test_a_simulation_may_take_its_time_between_calls(drive: Drive) -> None:
+    assert drive.set_up().ok
+    assert drive.step(0).ok
+    time.sleep(1.5 * WATCHED_S)
+    assert drive.call(POLL, 500).ok

@@ -4,7 +4,7 @@ import os
 import socket
 import subprocess
 import threading
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import pytest
 from conftest import csv_text, session
@@ -38,7 +38,7 @@ def board_that(answer):
 
         def serve():
             connection, _ = server.accept()
-            with connection:
+            with connection, suppress(ConnectionError):
                 answer(connection)
 
         thread = threading.Thread(target=serve)
@@ -225,6 +225,18 @@ def test_answers_out_of_turn_are_refused(sim):
         done = run(sim, "--bus", bus, policy="edf")
     assert done.code == 1
     assert "where the number of its connectors was awaited" in done.stderr
+
+
+def test_a_peer_that_sends_without_end_is_given_up(sim):
+    def answer(connection):
+        connection.sendall(HELLO % b"01000000" + b"t0010\r" * 5000)
+        while connection.recv(1000):
+            pass
+
+    with board_that(answer) as bus:
+        done = run(sim, "--bus", bus, policy="edf")
+    assert done.code == 1
+    assert "it sends more than 4096 frames, where the number of its connectors was awaited" in done.stderr
 
 
 def test_nobody_there_is_told(sim):

@@ -35,6 +35,13 @@ def whole_positive(text: str) -> int:
     return int(value)
 
 
+def whole_not_negative(text: str) -> int:
+    value = not_negative(text)
+    if value != int(value):
+        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number")
+    return int(value)
+
+
 def share(text: str) -> float:
     value = _number(text)
     if not 0 <= value <= 1:

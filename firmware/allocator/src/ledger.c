@@ -246,6 +246,14 @@ bool taper_ledger_is_accepted(const taper_ledger_t *ledger, uint8_t connector) {
     return ledger->entry[connector].accepts;
 }
 
+bool taper_ledger_is_starting(const taper_ledger_t *ledger) {
+    int32_t unknown_mA = 0;
+    for (uint8_t i = 0; i < ledger->config->connector_count; i++) {
+        unknown_mA |= ledger->entry[i].unknown_mA;
+    }
+    return unknown_mA != 0;
+}
+
 int32_t taper_ledger_told_mA(const taper_ledger_t *ledger, uint8_t connector) {
     const taper_ledger_entry_t *entry = &ledger->entry[connector];
     const int32_t known_mA = taper_max_i32(in_force_mA(entry), entry->fade[0].mA);

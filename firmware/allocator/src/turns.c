@@ -1,5 +1,7 @@
 #include "turns.h"
 
+/** A longer wait or turn is as good as this [s]. */
+#define AGE_MOST_s 1000000u
 /** Longest time that is booked at once: what lies between two ticks further apart was no charging under control. */
 #define BOOKED_AT_ONCE_ms 3600000
 
@@ -199,11 +201,12 @@ void taper_turns_line_up(const taper_allocator_t *allocator, const taper_station
 
 /* ---- Afterwards */
 
-static void note_switch(taper_turn_t *turn, bool on, uint32_t now_ms) {
+static void note_switch(taper_allocator_t *allocator, taper_turn_t *turn, bool on, uint32_t now_ms) {
     if (turn->on != on) {
         turn->on = on;
         turn->switched = true;
         turn->since_ms = now_ms;
+        allocator->switches++;
     }
 }
 
@@ -232,10 +235,44 @@ void taper_turns_end(taper_allocator_t *allocator, const taper_station_config_t 
         const taper_demand_t *demand = &snapshot->demand[i];
         waited[i] = turn->place > 0;
         turn->place = 0;
-        note_switch(turn, setpoints->current_mA[i] > 0, snapshot->now_ms);
+        note_switch(allocator, turn, setpoints->current_mA[i] > 0, snapshot->now_ms);
         turn->lacks_mW = demand->active ? lacks_mW(config, demand, proposal, i, setpoints->current_mA[i]) : 0;
     }
     note_places(allocator, queue, waited, setpoints);
+}
+
+/* ---- Over a restart */
+
+taper_turn_kept_t taper_allocator_keep(const taper_allocator_t *allocator, uint8_t connector,
+                                       uint32_t now_ms) {
+    const taper_turn_t *turn = &allocator->turn[connector];
+    return (taper_turn_kept_t){
+        .on = turn->on,
+        .switched = turn->switched,
+        .waits = turn->place > 0,
+        .since_s = taper_elapsed_ms(now_ms, turn->since_ms) / 1000u,
+        .waiting_s = taper_elapsed_ms(now_ms, turn->waiting_ms) / 1000u,
+        .owed_Ws = taper_saturate_i32(turn->owed_mWs / 1000),
+    };
+}
+
+/** The time `age_s` and `later_s` before `now_ms`; no further back than the clock can tell. */
+static uint32_t back_ms(uint32_t age_s, uint32_t later_s, uint32_t now_ms) {
+    const uint64_t back_s = (uint64_t)age_s + later_s;
+    return now_ms - (back_s < AGE_MOST_s ? (uint32_t)back_s : AGE_MOST_s) * 1000u;
+}
+
+void taper_allocator_restore(taper_allocator_t *allocator, uint8_t connector, uint8_t session,
+                             const taper_turn_kept_t *kept, uint32_t later_s, uint32_t now_ms) {
+    allocator->turn[connector] = (taper_turn_t){
+        .on = kept->on,
+        .switched = kept->switched,
+        .place = kept->waits ? 1 : 0, /* the next allocation numbers them */
+        .session = session,
+        .since_ms = back_ms(kept->since_s, later_s, now_ms),
+        .waiting_ms = back_ms(kept->waiting_s, later_s, now_ms),
+        .owed_mWs = (int64_t)kept->owed_Ws * 1000,
+    };
 }
 
 taper_waiting_t taper_allocator_waiting(const taper_allocator_t *allocator, uint8_t connector) {

@@ -7,10 +7,6 @@
 #define SCALE_percent 75
 #define SCALE_ROUNDS  4
 
-static uint32_t world_ms(const taper_station_t *station, uint32_t now_ms) {
-    return now_ms * station->options.time_scale; /* both clocks wrap, and so does their product */
-}
-
 /** The greatest current of a connector's conductors, or absent. */
 static int32_t measured_mA(const taper_station_t *station, uint8_t i, uint32_t now_ms) {
     const taper_evse_status_t *status = &station->sessions.session[i].status;
@@ -54,7 +50,7 @@ static void watch_draw(taper_station_t *station, uint8_t i, uint32_t now_ms) {
         .measured_mA = measured_mA(station, i, now_ms),
         .min_mA = demand->min_mA,
     };
-    if (taper_draw_update(draw, &report, world_ms(station, now_ms))) {
+    if (taper_draw_update(draw, &report, taper_station_world_ms(station, now_ms))) {
         station->sessions.revision++; /* the planner is to know */
     }
     note_draw(station, i, before, report.measured_mA);
@@ -130,6 +126,7 @@ static void allocate(taper_station_t *station, uint32_t now_ms) {
         reserved_mA[i] = reserve_mA(station, i, now_ms);
         station->setpoint_session[i] = taper_session_number(&station->sessions, i);
     }
+    taper_record_resume_turns(station, now_ms);
     taper_allocate(&station->allocator, config, &station->snapshot, &station->proposal,
                    &station->limit_now.supply, reserved_mA, &station->target);
     if (station->rival_heard || station->stopped) {
@@ -203,7 +200,7 @@ static void grant(taper_station_t *station, uint32_t now_ms) {
     const taper_station_config_t *config = station->options.config;
     taper_setpoints_t granted = {{0}}; /* all of it: it is compared whole */
     taper_shape_bound(&station->shape, config, &station->snapshot, &station->target,
-                      world_ms(station, now_ms), &station->shaped);
+                      taper_station_world_ms(station, now_ms), &station->shaped);
     taper_ledger_grant(&station->ledger, config, &station->snapshot, station->proposal.rank,
                        &station->limit_now.supply, &station->shaped, &granted);
     enforce(station, &granted);

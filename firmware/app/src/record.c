@@ -3,7 +3,8 @@
  * in the store's area TAPER_STORE_STATION, little endian:
  *
  *     CRC-32 of the station's name u32, wall clock u32 (0: not known), starts u32, failsafe limit i32, entries u8, 3 bytes 0
- *     entries: connector u8, flags u8, error u8, session u8, revision u8, 3 bytes 0, 15 numbers i32 (put_session()), identifier
+ *     entries: connector u8, flags u8, error u8, session u8, revision u8, 3 bytes 0, 15 numbers (put_session()), 3 of its turn
+ *              (put_turn()), identifier
  *
  * Connectors without a session have no entry.
  */
@@ -18,7 +19,7 @@
 #define BODY_FIXED  20u
 #define ENTRIES_AT  16u
 #define ENTRY_FIXED 8u
-#define ENTRY       (ENTRY_FIXED + 15u * 4u + TAPER_IDENTIFIER_LENGTH)
+#define ENTRY       (ENTRY_FIXED + 15u * 4u + 3u * 4u + TAPER_IDENTIFIER_LENGTH)
 
 _Static_assert(TAPER_STORED_ENVELOPE + BODY_FIXED + ENTRY * TAPER_MAX_CONNECTORS <= TAPER_STORE_RECORD_MAX,
                "ports have room for it");
@@ -28,6 +29,9 @@ _Static_assert(TAPER_STORED_ENVELOPE + BODY_FIXED + ENTRY * TAPER_MAX_CONNECTORS
 #define PAUSED      0x04u
 #define STOPPED     0x08u
 #define LOCKED      0x10u
+#define ON          0x20u
+#define SWITCHED    0x40u
+#define WAITS       0x80u
 
 /** Memory that wears out is not written more often than this, whatever comes and goes on the bus. */
 #define CHANGE_GAP_ms UINT32_C(10000)
@@ -53,12 +57,28 @@ static uint32_t name_crc(const taper_station_t *station) {
 
 /* ---- Out */
 
-static uint8_t flags_of(const taper_station_t *station, uint8_t i, bool has_session,
-                        const taper_session_kept_t *kept) {
-    const unsigned asks = (kept->complete ? COMPLETE : 0u) | (kept->pause_requested ? PAUSED : 0u) |
-                          (kept->stop_requested ? STOPPED : 0u);
-    const bool locked = station->draw[i].state == TAPER_DRAW_LOCKED;
-    return (uint8_t)((has_session ? HAS_SESSION | asks : 0u) | (locked ? LOCKED : 0u));
+/** The turn as it was kept, as long as its session is awaited. */
+static taper_turn_kept_t turn_of(const taper_station_t *station, uint8_t i, uint32_t now_ms) {
+    if (!station->turn_awaits[i]) {
+        return taper_allocator_keep(&station->allocator, i, taper_station_world_ms(station, now_ms));
+    }
+    const uint32_t later_s = taper_session_since_kept_s(&station->sessions, now_ms);
+    taper_turn_kept_t turn = station->turn_kept[i];
+    turn.since_s += later_s;
+    turn.waiting_s += later_s;
+    return turn;
+}
+
+static unsigned session_flags(const taper_session_kept_t *kept, const taper_turn_kept_t *turn) {
+    return HAS_SESSION | (kept->complete ? COMPLETE : 0u) | (kept->pause_requested ? PAUSED : 0u) |
+           (kept->stop_requested ? STOPPED : 0u) | (turn->on ? ON : 0u) | (turn->switched ? SWITCHED : 0u) |
+           (turn->waits ? WAITS : 0u);
+}
+
+static void put_turn(taper_writer_t *to, const taper_turn_kept_t *turn) {
+    taper_put_u32(to, turn->since_s);
+    taper_put_u32(to, turn->waiting_s);
+    taper_put_i32(to, turn->owed_Ws);
 }
 
 static void put_session(taper_writer_t *to, const taper_session_kept_t *kept) {
@@ -85,18 +105,20 @@ static bool put_entry(taper_station_t *station, uint8_t i, taper_writer_t *to, u
     taper_session_kept_t kept;
     memset(&kept, 0, sizeof kept);
     const bool has_session = taper_session_keep(&station->sessions, i, now_ms, &kept);
-    const uint8_t flags = flags_of(station, i, has_session, &kept);
-    if (flags == 0) {
+    const taper_turn_kept_t turn = turn_of(station, i, now_ms);
+    const bool locked = station->draw[i].state == TAPER_DRAW_LOCKED;
+    if (!has_session && !locked) {
         return false;
     }
     taper_put_u8(to, i);
-    taper_put_u8(to, flags);
+    taper_put_u8(to, (uint8_t)((has_session ? session_flags(&kept, &turn) : 0u) | (locked ? LOCKED : 0u)));
     taper_put_u8(to, kept.error);
     taper_put_u8(to, kept.used.a.session);
     taper_put_u8(to, kept.used.a.revision);
     taper_put_u8(to, 0);
     taper_put_u16(to, 0);
     put_session(to, &kept);
+    put_turn(to, &turn);
     const char *identifier = taper_transfers_identifier(&station->transfers, i);
     memset(to->at, 0, TAPER_IDENTIFIER_LENGTH);
     memcpy(to->at, identifier, strlen(identifier)); /* at most so long */
@@ -134,6 +156,7 @@ static void write_record(taper_station_t *station, uint32_t now_ms) {
         station->record.next_copy = area.next_copy;
         station->record.failsafe_W = failsafe_told_W(station);
         station->record.changes = station->sessions.changes;
+        station->record.switches = station->allocator.switches;
         station->record.has_sessions = station->scratch.record[TAPER_STORED_HEADER + ENTRIES_AT] > 0;
     } else {
         station->record.changes = station->sessions.changes - 1u;
@@ -163,6 +186,17 @@ static void get_session(taper_reader_t *from, taper_session_kept_t *kept) {
     kept->stay_s = taper_get_u32(from);
 }
 
+static taper_turn_kept_t get_turn(taper_reader_t *from, unsigned flags) {
+    taper_turn_kept_t turn;
+    turn.on = (flags & ON) != 0u;
+    turn.switched = (flags & SWITCHED) != 0u;
+    turn.waits = (flags & WAITS) != 0u;
+    turn.since_s = taper_get_u32(from);
+    turn.waiting_s = taper_get_u32(from);
+    turn.owed_Ws = taper_get_i32(from);
+    return turn;
+}
+
 static void get_entry(taper_station_t *station, taper_reader_t from) {
     taper_session_kept_t kept;
     memset(&kept, 0, sizeof kept);
@@ -176,12 +210,15 @@ static void get_entry(taper_station_t *station, taper_reader_t from) {
     kept.stop_requested = (flags & STOPPED) != 0u;
     from.at += 3;
     get_session(&from, &kept);
+    const taper_turn_kept_t turn = get_turn(&from, flags);
     if (i >= station->options.config->connector_count) {
         return;
     }
     if ((flags & HAS_SESSION) != 0u && taper_session_restore(&station->sessions, i, &kept)) {
         memcpy(station->transfers.identifier[i], from.at, TAPER_IDENTIFIER_LENGTH);
         station->identifier_kept[i] = true;
+        station->turn_kept[i] = turn;
+        station->turn_awaits[i] = true;
     }
     if ((flags & LOCKED) != 0u) {
         station->draw[i].state = TAPER_DRAW_LOCKED;
@@ -250,10 +287,32 @@ void taper_record_start_clock(taper_station_t *station, uint32_t now_ms) {
     station->record.written_ms = now_ms;
 }
 
+/** What others may still draw by an earlier life leaves room for few at first. A turn is not over because of that, nor did it
+    begin: until all of it is over, every allocation begins with the turns as they were. */
+void taper_record_resume_turns(taper_station_t *station, uint32_t now_ms) {
+    const bool is_starting =
+        station->supervisor.mode == TAPER_MODE_INIT || taper_ledger_is_starting(&station->ledger);
+    for (uint8_t i = 0; i < station->options.config->connector_count; i++) {
+        if (!station->turn_awaits[i]) {
+            continue;
+        }
+        const bool is_kept = taper_session_is_kept(&station->sessions, i);
+        if (is_kept && station->snapshot.demand[i].active) {
+            taper_allocator_restore(
+                &station->allocator, i, station->snapshot.demand[i].session, &station->turn_kept[i],
+                taper_session_since_kept_s(&station->sessions, now_ms), station->snapshot.now_ms);
+            station->turn_awaits[i] = is_starting;
+        } else {
+            station->turn_awaits[i] = is_kept;
+        }
+    }
+}
+
 static bool is_due(const taper_station_t *station, uint32_t now_ms) {
     const taper_station_record_t *record = &station->record;
-    const bool changed =
-        record->failsafe_W != failsafe_told_W(station) || record->changes != station->sessions.changes;
+    const bool changed = record->failsafe_W != failsafe_told_W(station) ||
+                         record->changes != station->sessions.changes ||
+                         record->switches != station->allocator.switches;
     const uint32_t since_ms = taper_elapsed_ms(now_ms, record->written_ms);
     return changed ? since_ms >= CHANGE_GAP_ms : record->has_sessions && since_ms >= ACCOUNT_GAP_ms;
 }

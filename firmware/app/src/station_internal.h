@@ -51,6 +51,11 @@ void taper_station_seal(taper_station_t *station);
 /** Fault 48: if they are not as they were decided, they are worked out again. */
 void taper_station_check_seal(taper_station_t *station, uint32_t now_ms);
 
+/** The world's time, in which vehicles and the allocator live. */
+static inline uint32_t taper_station_world_ms(const taper_station_t *station, uint32_t now_ms) {
+    return now_ms * station->options.time_scale; /* both clocks wrap, and so does their product */
+}
+
 /* phases.c */
 
 /** Bound what connector `i` is booked by, and which conductors it is allowed, by what it was told; after the snapshot. */
@@ -141,6 +146,9 @@ void taper_record_load(taper_station_t *station);
 
 /** The clock runs from `now_ms`. */
 void taper_record_start_clock(taper_station_t *station, uint32_t now_ms);
+
+/** Before the allocation of a tick: turns go on where they were before a restart. */
+void taper_record_resume_turns(taper_station_t *station, uint32_t now_ms);
 
 /** A tick finds out whether it should be written; the next call, a poll if there is one, does that: a tick has enough to do. */
 void taper_record_update(taper_station_t *station, bool in_tick, uint32_t now_ms);

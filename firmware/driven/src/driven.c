@@ -59,12 +59,13 @@ static void describe(taper_driven_t *driven) {
     driven->config.connectors = driven->connectors;
 }
 
-/** What waited for the station before is not for the new one. */
-static void drop_frames(const taper_driven_t *driven) {
+/** What waited for the station before, or was lost to it, is nothing to the new one. */
+static void forget_frames(taper_driven_t *driven) {
     const taper_port_t *port = driven->options.port;
     taper_frame_t frame;
     while (port->receive(port->context, &frame)) {
     }
+    driven->slcan->overflows = 0;
 }
 
 /** A new station by `driven->setup`. @return whether it took the settings. */
@@ -78,7 +79,7 @@ static bool make_station(taper_driven_t *driven) {
     if (policy > TAPER_DRIVE_LLF) {
         return false;
     }
-    drop_frames(driven);
+    forget_frames(driven);
     describe(driven);
     options.config = &driven->config;
     options.iterations_per_tick = driven->setup.iterations_per_tick;
@@ -111,7 +112,7 @@ static void take_setup(taper_driven_t *driven, const taper_slcan_message_t *mess
     if (is_good && part == 0) {
         return;
     }
-    if (board->set_up != NULL) {
+    if (is_good && board->set_up != NULL) {
         board->set_up(board->context, &driven->setup);
     }
     done.ok = is_good && make_station(driven);
@@ -130,11 +131,12 @@ static bool step(taper_driven_t *driven, uint32_t now_ms) {
     const taper_planner_t *planner = &driven->station->planner;
     const uint32_t started_ms = planner->started_ms;
     const uint16_t before = planner->iterations;
+    const bool works = planner->verdict == TAPER_VERDICT_SOLVING;
     const uint8_t slices = planner->slices;
     taper_station_step(driven->station, now_ms);
     const bool is_new = planner->started_ms != started_ms;
     driven->slice_iterations = (uint16_t)(planner->iterations - (is_new ? 0 : before));
-    return is_new || planner->slices != slices;
+    return works || is_new || planner->slices != slices;
 }
 
 static uint32_t kicks(const taper_driven_board_t *board) {

@@ -106,6 +106,13 @@ void taper_session_start_clock(taper_session_table_t *table, uint32_t unix_s, ui
     }
 }
 
+uint32_t taper_session_since_kept_s(const taper_session_table_t *table, uint32_t now_ms) {
+    const uint32_t unix_s = taper_session_unix_s(table, now_ms);
+    const uint64_t world_ms = (uint64_t)taper_elapsed_ms(now_ms, table->kept_at_ms) * table->time_scale;
+    const bool known = table->kept_unix_s != 0 && unix_s > table->kept_unix_s;
+    return known ? unix_s - table->kept_unix_s : (uint32_t)(world_ms / 1000u);
+}
+
 uint32_t taper_session_kept_unix_s(const taper_session_table_t *table, uint32_t now_ms) {
     if (table->clock_heard.heard || table->kept_unix_s == 0) {
         return taper_session_unix_s(table, now_ms);

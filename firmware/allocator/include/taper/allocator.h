@@ -48,7 +48,17 @@ typedef struct {
     bool started;
     uint32_t updated_ms; /**< time of the last snapshot */
     uint8_t waiting;     /**< so many wait */
+    uint32_t switches;   /**< counts them all; wraps */
 } taper_allocator_t;
+
+/** What of a turn has to outlive a restart. Ages are in the world's time. */
+typedef struct {
+    bool on, switched; /**< as in taper_turn_t */
+    bool waits;
+    uint32_t since_s;   /**< so long ago was the last switch */
+    uint32_t waiting_s; /**< so long does it wait */
+    int32_t owed_Ws;
+} taper_turn_kept_t;
 
 /** Where a connector stands among those that wait: `place` 1.. of `of`; 0 of 0: it does not wait. */
 typedef struct {
@@ -68,6 +78,14 @@ void taper_allocator_init(taper_allocator_t *allocator);
 void taper_allocate(taper_allocator_t *allocator, const taper_station_config_t *config,
                     const taper_snapshot_t *snapshot, const taper_proposal_t *proposal,
                     const taper_supply_t *supply, const int32_t *reserved_mA, taper_setpoints_t *setpoints);
+
+/** The turn of a connector, to be kept. `now_ms` is that of a snapshot. */
+taper_turn_kept_t taper_allocator_keep(const taper_allocator_t *allocator, uint8_t connector,
+                                       uint32_t now_ms);
+
+/** The connector goes on with a turn that was kept, `later_s` after that, for the `session` that it has at the next snapshot. */
+void taper_allocator_restore(taper_allocator_t *allocator, uint8_t connector, uint8_t session,
+                             const taper_turn_kept_t *kept, uint32_t later_s, uint32_t now_ms);
 
 /** Who waits, by the last allocation, in the order in which they will be switched on. Cost: constant. */
 taper_waiting_t taper_allocator_waiting(const taper_allocator_t *allocator, uint8_t connector);

@@ -99,6 +99,9 @@ void taper_ledger_update(taper_ledger_t *ledger, uint32_t now_ms);
 /** Whether a connector is known to have accepted a setpoint of ours, and so to be in the session that it was for. */
 bool taper_ledger_is_accepted(const taper_ledger_t *ledger, uint8_t connector);
 
+/** Whether what an earlier controller told some connector may still be in force. Cost: O(connectors). */
+bool taper_ledger_is_starting(const taper_ledger_t *ledger);
+
 /** What a connector may draw per phase, by all that is open, and what it is seen to draw [mA]. */
 int32_t taper_ledger_may_mA(const taper_ledger_t *ledger, uint8_t connector);
 

@@ -152,6 +152,7 @@ typedef struct {
     bool has_sessions;   /**< as it was written last, and so the following: */
     int32_t failsafe_W;  /**< the gateway's last word on it, or absent: the description's holds */
     uint32_t changes;    /**< of the session table */
+    uint32_t switches;   /**< of the allocator */
     uint32_t written_ms; /**< when that was, or was tried */
     uint32_t starts;
 } taper_station_record_t;
@@ -185,9 +186,11 @@ typedef struct {
     taper_alarm_t alarm[TAPER_ALARMS];
     taper_station_record_t record;
     bool identifier_kept[TAPER_MAX_CONNECTORS]; /**< told before a restart, and not since */
-    bool rival_heard;                           /**< a second controller speaks */
-    uint32_t rival_ms;                          /**< when it was last heard */
-    bool started;                               /**< there was a step or a poll: the ledger has begun */
+    bool turn_awaits[TAPER_MAX_CONNECTORS];     /**< for its session: the turn that was kept */
+    taper_turn_kept_t turn_kept[TAPER_MAX_CONNECTORS];
+    bool rival_heard;  /**< a second controller speaks */
+    uint32_t rival_ms; /**< when it was last heard */
+    bool started;      /**< there was a step or a poll: the ledger has begun */
     bool stopped;
     uint8_t setpoint_counter[TAPER_MAX_CONNECTORS];
     uint8_t plan_counter[TAPER_MAX_CONNECTORS];

@@ -22,7 +22,7 @@ typedef enum {
 #define TAPER_STORE_COPIES 2u
 
 /** The longest record [bytes]: of the area TAPER_STORE_STATION of an image for its largest station. */
-#define TAPER_STORE_RECORD_MAX (64u + 96u * TAPER_MAX_CONNECTORS)
+#define TAPER_STORE_RECORD_MAX (64u + 104u * TAPER_MAX_CONNECTORS)
 
 typedef struct {
     void *context;

@@ -181,6 +181,9 @@ bool taper_session_restore(taper_session_table_t *table, uint8_t connector, cons
  */
 void taper_session_start_clock(taper_session_table_t *table, uint32_t unix_s, uint32_t now_ms);
 
+/** World's time since the sessions were kept; since the start, as long as either wall clock is not known [s]. */
+uint32_t taper_session_since_kept_s(const taper_session_table_t *table, uint32_t now_ms);
+
 /** The wall clock as far as it is known [Unix s]: had the restart taken no time, until it was set. 0: not known. */
 uint32_t taper_session_kept_unix_s(const taper_session_table_t *table, uint32_t now_ms);
 
