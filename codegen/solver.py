@@ -65,7 +65,7 @@ def generate_solver(station: Station, real: Real) -> Solver:
         text = (out / f"{workspace.PREFIX}workspace.c").read_text()
     parts = workspace.parse(text)
     _check_settings(parts, files["inc/public/osqp_api_types.h"])
-    exact = _exact_values(parts, p_matrix, a_matrix)
+    exact = {**_csc_arrays("data_P", p_matrix), **_csc_arrays("data_A", a_matrix)}
     parts = [workspace.with_values(part, exact) for part in parts]
     return Solver(station, real, workspace.referenced(parts), files)
 
@@ -88,27 +88,6 @@ def _settings(parts: list[Array | Struct], header: str) -> dict[str, float]:
         raise OsqpChanged(f"OSQPSettings has {len(names)} fields, the generated code {len(fields)}")
     texts = [field.removeprefix("(OSQPFloat)") for field in fields]
     return {name: float(text) for name, text in zip(names, texts, strict=True) if not text[0].isalpha()}
-
-
-def _exact_values(
-    parts: list[Array | Struct], p_matrix: sparse.csc_matrix, a_matrix: sparse.csc_matrix
-) -> dict[str, tuple[float, ...]]:
-    """What OSQP was given, and the KKT matrix [P + sigma I, A'; A, -1/rho I] that it makes of this."""
-    arrays = {part.name: part.values for part in parts if isinstance(part, Array)}
-    rows = a_matrix.shape[0]
-    sigma, rho_inverse = 1e-6, 1.0 / float(SETTINGS["rho"])
-    on_diagonal = p_matrix.indices == np.repeat(np.arange(p_matrix.shape[1]), np.diff(p_matrix.indptr))
-    kkt = np.zeros(p_matrix.nnz + a_matrix.nnz + rows)
-    kkt[list(arrays["linsys_PtoKKT"] or ())] = p_matrix.data + np.where(on_diagonal, sigma, 0.0)
-    kkt[list(arrays["linsys_AtoKKT"] or ())] = a_matrix.data
-    kkt[list(arrays["linsys_rhotoKKT"] or ())] = -rho_inverse
-    return {
-        **_csc_arrays("data_P", p_matrix),
-        **_csc_arrays("data_A", a_matrix),
-        "linsys_KKT_x": tuple(kkt.tolist()),
-        "linsys_rho_inv_vec": (rho_inverse,) * rows,
-        "work_rho_inv_vec_val": (rho_inverse,) * rows,
-    }
 
 
 def _csc_arrays(name: str, matrix: sparse.csc_matrix) -> dict[str, tuple[float, ...]]:
@@ -159,8 +138,9 @@ def solvers_header(stations: list[Station]) -> str:
 /**
  * The solvers that this image holds. Generated, see codegen/.
  *
- * They start without a factorisation: before the first osqp_solve(), write all values of A and P and call
- * osqp_update_data_mat().
+ * They start without a factorisation, and without what follows from the penalty: before the first osqp_solve(), call
+ * osqp_update_rho(), which fails for want of the rest, write all values of A and P, and call osqp_update_data_mat() and
+ * osqp_update_data_vec().
  */
 #ifndef TAPER_SOLVERS_H
 #define TAPER_SOLVERS_H

@@ -5,8 +5,8 @@ array in RAM. Here it is taken apart into its definitions, and written again:
 
 - Index arrays that nothing writes are `const`, so that they stay in flash. See CONSTANT.
 - Arrays of zeros have no initialiser: they cost RAM, but no flash to start it from.
-- The factorisation (L, D, 1/D) starts as zeros too. It is that of the generator's example values, of no use to
-  anyone: the firmware writes its own P and A and calls osqp_update_data_mat(), which factorises, before it solves.
+- What the firmware writes before it solves starts as zeros too: it would be that of the generator's example values, of
+  no use to anyone. See WRITTEN.
 - Vectors that nothing refers to (the scratch of data scaling, which is off) are left out.
 - All that the firmware has no business with is `static`.
 - Numbers are the shortest text that reads back as the same double or float.
@@ -36,8 +36,16 @@ CONSTANT = (
     *("linsys_P", "linsys_etree", "linsys_Lnz", "linsys_L_p", "linsys_L_i"),
 )
 
-# Written by the first osqp_update_data_mat(), see above.
-FACTORISATION = ("linsys_L_x", "linsys_D", "linsys_Dinv")
+# Written before the first iteration, in this order:
+#   work_rho_vec, work_rho_inv_vec, linsys_rho_inv_vec   by osqp_update_rho(), with the last part of the values of KKT
+#   the other values of KKT, and linsys_L_x, _D, _Dinv   by osqp_update_data_mat(), which factorises
+#   data_l_val, data_u_val                               by osqp_update_data_vec()
+# The values of P and A stay: they are the example that tells their pattern.
+WRITTEN = (
+    *("work_rho_vec_val", "work_rho_inv_vec_val", "linsys_rho_inv_vec"),
+    *("linsys_KKT_x", "linsys_L_x", "linsys_D", "linsys_Dinv"),
+    *("data_l_val", "data_u_val"),
+)
 
 # The firmware writes these values in place.
 SHARED = ("data_P_csc_x", "data_A_csc_x")
@@ -119,7 +127,7 @@ def _struct(found: re.Match[str]) -> Struct:
 def _array(found: re.Match[str]) -> Array:
     is_int = found[1] in _INT_TYPES
     name = _unprefixed(found[2])
-    if found[4] is None or name in FACTORISATION:
+    if found[4] is None or name in WRITTEN:
         return Array(name, is_int, int(found[3]), None)
     texts = [text.strip().removeprefix("(OSQPFloat)") for text in found[4].rstrip(",").split(",")]
     values = tuple(int(text) if is_int else float(text) for text in texts)

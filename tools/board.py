@@ -15,19 +15,23 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from import_acn import REQUEST_COLUMNS, read_acn_csv, sessions_of
 from taperlib.cases import KW_PER_CAR
 from taperlib.emulator import EmulatorError, emulated
+from taperlib.feeders import connector_count
 from taperlib.files import InputError
+from taperlib.image import BrokenImage, Image
 from taperlib.numbers import positive, whole_not_negative
 from taperlib.sessions import Session, peak_present, read_sessions_csv, write_sessions_csv
 
 ROOT = Path(__file__).resolve().parents[1]
+BUILD = ROOT / "build"
 WEEK = ROOT / "host_sim/data/acn-caltech-2019-07-14.csv"
-SIMULATOR = ROOT / "build/host-release/host_sim/taper-sim"
+SIMULATOR = BUILD / "host-release/host_sim/taper-sim"
 DAY_S = 86400.0
+TAPER_SHARE = 0.6
 LIMIT_SHARE = 1 / 3
 EXIT_FAILED, EXIT_LIMIT_EXCEEDED = 1, 3
-CONNECTORS = {"hub": 8, "garage": 54}
 
 
 class BoardError(Exception):
@@ -47,16 +51,8 @@ class Build:
         return self.image.with_suffix(".map")
 
 
-@dataclass(frozen=True)
-class Memory:
-    """What the image takes of the board [bytes]."""
-    flash: int
-    ram: int
-    ram_limit: int
-
-
 def build_of(preset: str) -> Build:
-    folder = ROOT / "build" / preset
+    folder = BUILD / preset
     try:
         cache = (folder / "CMakeCache.txt").read_text(encoding="utf-8")
     except OSError:
@@ -68,35 +64,14 @@ def build_of(preset: str) -> Build:
     return Build(preset, board, station, folder / "firmware/mps2" / f"taper-{board}.elf")
 
 
-def memory_of(image: Path) -> Memory:
-    """By the sections of the image, as image.ld lays them out."""
-    table = _run("arm-none-eabi-size", "-A", "-d", str(image))
-    size = {name: int(bytes_) for name, bytes_ in re.findall(r"^(\.\w+(?:\.\w+)?)\s+(\d+)", table, re.MULTILINE)}
-    code = sum(size.get(name, 0) for name in (".vectors", ".text", ".rodata", ".ARM.exidx"))
-    ram = sum(size.get(name, 0) for name in (".stack", ".data", ".bss", ".noinit"))
-    limit = re.search(r"^([0-9a-f]+) A mps2_ram_size$", _run("arm-none-eabi-nm", str(image)), re.MULTILINE)
-    if limit is None:
-        raise BoardError(f"{image}: has no symbol mps2_ram_size")
-    return Memory(flash=code + size[".data"], ram=ram, ram_limit=int(limit[1], 16))
-
-
-def _run(*command: str) -> str:
-    try:
-        return subprocess.run(command, check=True, capture_output=True, text=True).stdout
-    except FileNotFoundError:
-        raise BoardError(f"{command[0]} is not installed: sudo apt-get install gcc-arm-none-eabi") from None
-    except subprocess.CalledProcessError as error:
-        raise BoardError(f"{' '.join(command)}: {error.stderr.strip()}") from None
-
-
-def sessions_of_day(week: Path, day: int, folder: Path) -> list[Session]:
-    """Who came on that day, from its midnight; who stayed longer leaves with it."""
-    file = folder / "week.csv"
-    _run(sys.executable, str(ROOT / "tools/import_acn.py"), str(week), "--out", str(file))
+def sessions_of_day(week: Path, day: int) -> list[Session]:
+    """Who came on that day, from its midnight; who stayed longer leaves with it. Vehicles as import_acn.py draws them."""
+    rows = read_acn_csv(week, REQUEST_COLUMNS["requested"])
     begin_s, end_s = day * DAY_S, (day + 1) * DAY_S
     chosen = [dataclasses.replace(session, arrival_s=session.arrival_s - begin_s,
                                   departure_s=min(session.departure_s, end_s) - begin_s)
-              for session in read_sessions_csv(file) if begin_s <= session.arrival_s < end_s]
+              for session in sessions_of(rows, 0, KW_PER_CAR, TAPER_SHARE, driver_departure=False)
+              if begin_s <= session.arrival_s < end_s]
     if not chosen:
         raise BoardError(f"{week}: nobody came on day {day}")
     return chosen
@@ -104,7 +79,7 @@ def sessions_of_day(week: Path, day: int, folder: Path) -> list[Session]:
 
 def default_limit_kw(sessions: list[Session], station: str) -> float:
     """A third of what those cars could draw that find a connector at the busiest moment."""
-    cars = min(peak_present(sessions), CONNECTORS.get(station, sys.maxsize))
+    cars = min(peak_present(sessions), connector_count(station))
     return round(LIMIT_SHARE * cars * KW_PER_CAR, 1)
 
 
@@ -125,10 +100,22 @@ def simulate(options: argparse.Namespace, build: Build, limit_kw: float, session
 
 
 def number(value: float | None) -> str:
-    return "unknown" if value is None else f"{value:,.0f}"
+    return f"{value:,.0f}" if value else "none"
 
 
-def report(build: Build, memory: Memory, summary: dict, limit_kw: float, seconds: float) -> list[str]:
+def memory_lines(image: Image) -> list[str]:
+    memory = image.memory()
+    limit_B = next(symbol.address for symbol in image.symbols if symbol.name == "mps2_ram_size")
+    code_B, tables_B, start_B = (memory[f"flash_{part}_B"] for part in ("code", "solver_tables", "start_values"))
+    return [
+        f"  flash             {number(code_B + tables_B + start_B)} bytes: code and constants {number(code_B)}, the solver's "
+        f"tables {number(tables_B)}, start values of RAM {number(start_B)}",
+        f"  RAM               {number(memory['ram_B'])} of {number(limit_B)} bytes: solver {number(memory['ram_solver_B'])}, "
+        f"station {number(memory['ram_station_B'])}, stack {number(memory['ram_stack_B'])}",
+    ]
+
+
+def report(build: Build, summary: dict, limit_kw: float, seconds: float) -> list[str]:
     board = summary["board"]
     per_tick = board["instructions_per_tick"]
     stack = f"{number(board['stack_used_b'])} of {number(board['stack_size_b'])} bytes used"
@@ -141,8 +128,7 @@ def report(build: Build, memory: Memory, summary: dict, limit_kw: float, seconds
         f"  instructions      per tick: median {number(per_tick['p50'])}, worst {number(per_tick['max'])}, "
         f"worst without a solver slice {number(per_tick['max_without_slice'])}",
         f"                    per poll: worst {number(board['max_instructions_per_poll'])}",
-        f"  memory            flash {number(memory.flash)} bytes; RAM {number(memory.ram)} of "
-        f"{number(memory.ram_limit)} bytes, the stack included",
+        *memory_lines(Image(build.image)),
         f"  stack             {stack}",
         f"  map               {build.map.relative_to(ROOT)}",
     ]
@@ -164,21 +150,20 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
 
 def main(arguments: list[str] | None = None) -> int:
     options = parse(arguments)
-    options.out = options.out or ROOT / "build/board" / options.preset
+    options.out = options.out or BUILD / "board" / options.preset
     try:
         build = build_of(options.preset)
-        memory = memory_of(build.image)
         options.out.mkdir(parents=True, exist_ok=True)
-        sessions = sessions_of_day(options.week, options.day, options.out)
+        sessions = sessions_of_day(options.week, options.day)
         write_sessions_csv(options.out / "day.csv", sessions)
         limit_kw = options.limit_kw or default_limit_kw(sessions, build.station)
         began = time.monotonic()
         text = simulate(options, build, limit_kw, options.out / "day.csv")
         summary = json.loads((options.out / "summary.json").read_text(encoding="utf-8"))
-    except (BoardError, EmulatorError, InputError, OSError) as error:
+    except (BoardError, BrokenImage, EmulatorError, InputError, OSError) as error:
         print(f"board: {error}", file=sys.stderr)
         return EXIT_FAILED
-    print("\n".join(report(build, memory, summary, limit_kw, time.monotonic() - began)))
+    print("\n".join(report(build, summary, limit_kw, time.monotonic() - began)))
     faults = [line for line in text.splitlines() if not line.startswith("taper: start:")]
     if faults:
         print("board: the image reported:", *faults, sep="\n", file=sys.stderr)

@@ -20,7 +20,7 @@ static void tell_start(uint32_t fault) {
 }
 
 /** Until the next millisecond, or byte. */
-static void sleep(void) {
+static void rest(void) {
     const uint32_t state = mps2_interrupts_off();
     if (!mps2_uart_has_received()) {
         mps2_wait_for_interrupt();
@@ -43,6 +43,6 @@ int main(void) {
         if (!mps2_board_serve(&board)) {
             mps2_free_run_call(&board.station, mps2_clock_ms());
         }
-        sleep();
+        rest();
     }
 }

@@ -4,8 +4,8 @@
 #include "taper/fallback.h"
 #include "taper/stations.h"
 
-/** One slice in a tick is the least there is: the planner has 15 minutes, the tick a few milliseconds. */
-#define ITERATIONS TAPER_MIN_SLICE
+/** Short slices: the planner has 15 minutes, the tick a few milliseconds. */
+#define ITERATIONS MPS2_ITERATIONS
 
 _Static_assert(TAPER_PROPOSER_PLANNER == TAPER_DRIVE_PLANNER + 1 &&
                    TAPER_PROPOSER_EDF == TAPER_DRIVE_EDF + 1 && TAPER_PROPOSER_LLF == TAPER_DRIVE_LLF + 1,

@@ -71,16 +71,23 @@ static size_t receive(void *context, uint8_t *data, size_t size) {
     return count;
 }
 
+static bool can_send(void) {
+    return (MPS2_UART0->state & MPS2_UART_TX_FULL) == 0;
+}
+
+/** End a sleep when the UART can send again. @return whether it can already. */
+static bool ask_to_send(void) {
+    const uint32_t state = mps2_interrupts_off();
+    MPS2_UART0->control |= MPS2_UART_TX_IRQ;
+    mps2_interrupts_restore(state);
+    return can_send();
+}
+
 static size_t transmit(void *context, const uint8_t *data, size_t size) {
     (void)context;
     size_t count = 0;
-    while (count < size && (MPS2_UART0->state & MPS2_UART_TX_FULL) == 0) {
+    while (count < size && (can_send() || ask_to_send())) {
         MPS2_UART0->data = data[count++];
-    }
-    if (count < size) {
-        const uint32_t state = mps2_interrupts_off();
-        MPS2_UART0->control |= MPS2_UART_TX_IRQ;
-        mps2_interrupts_restore(state);
     }
     return count;
 }

@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-/** Start it, or start it anew: its first end comes after `ms`, at most 170 s. */
+/** Start it, or start it anew: its first end comes after `ms`, or 171 s if that is less. */
 void mps2_watchdog_start(uint32_t ms);
 
 /** Only when the station says so (kick_watchdog of its port). */

@@ -97,7 +97,8 @@ static const struct argp_option options[] = {
      "Weight of the price against having energy early, 0..1 (default: the station's own)", 0},
     {"tick-s", KEY_TICK, "N", 0, "Control tick [s], 1..3600 (default: 60)", 0},
     {"iterations", KEY_ITERATIONS, "N", 0,
-     "Solver iterations in a tick, 1..500 (default: 500 in ticks of 10 s or more, else 50); in a replay, as "
+     "Solver iterations in a tick, 1..500; fewer than 10 bound its work (default: 500 in ticks of 10 s or "
+     "more, else 50); in a replay, as "
      "taper-station was told",
      0},
     {"min-current-a", KEY_MINIMUM, "X", 0,

@@ -37,6 +37,7 @@ static void solve(OSQPSolver *solver, OSQPFloat *a, OSQPInt a_count, OSQPFloat *
     for (OSQPInt k = 0; k < variables; k++) {
         linear[k] = (OSQPFloat)-0.05;
     }
+    (void)osqp_update_rho(solver, (OSQPFloat)0.3); /* its factorisation fails: there are no values yet */
     require(osqp_update_data_mat(solver, p, NULL, p_count, a, NULL, a_count) == 0, "matrices");
     require(osqp_update_data_vec(solver, linear, low, high) == 0, "vectors");
     osqp_cold_start(solver);

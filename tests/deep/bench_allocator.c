@@ -53,9 +53,9 @@ static bool run(unsigned rounds) {
     taper_setpoints_t granted;
     for (unsigned round = 0; round < rounds; round++) {
         tree.snapshot.now_ms += 1000;
-        taper_allocate(&tree.allocator, &tree.config, &tree.snapshot, &tree.proposal, &tree.supply, NULL,
+        taper_allocate(&tree.allocator, &tree.config, &tree.snapshot, &tree.proposal, tree_rows(&tree), NULL,
                        &tree.setpoints);
-        taper_ledger_grant(&ledger, &tree.config, &tree.snapshot, tree.proposal.rank, &tree.supply,
+        taper_ledger_grant(&ledger, &tree.config, &tree.snapshot, tree.proposal.rank, tree_rows(&tree),
                            &tree.setpoints, &granted);
         passed = passed && taper_guard_passes(&tree.config, &tree.snapshot, &tree.supply, &granted) &&
                  taper_guard_hand_over_passes(&ledger, &tree.config, &tree.snapshot, &tree.supply, &granted);

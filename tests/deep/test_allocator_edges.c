@@ -36,8 +36,8 @@ static void test_what_is_reserved_beyond_the_last_connector_is_nothing(void) {
     const int32_t reserved_mA[TAPER_MAX_CONNECTORS] = {0, 10000};
     start(2, 20000, "01");
     tree.config.connector_count = tree.snapshot.count = 1;
-    taper_allocate(&tree.allocator, &tree.config, &tree.snapshot, &tree.proposal, &tree.supply, reserved_mA,
-                   &tree.setpoints);
+    taper_allocate(&tree.allocator, &tree.config, &tree.snapshot, &tree.proposal, tree_rows(&tree),
+                   reserved_mA, &tree.setpoints);
     TEST_ASSERT_EQUAL_INT32(20000, given(0));
 }
 
@@ -54,23 +54,22 @@ static void test_a_negative_wish_gives_nothing_and_a_great_one_is_exact(void) {
 }
 
 static void test_a_group_beyond_the_last_one_has_no_rows(void) {
-    taper_rooms_t rooms;
     start(1, 20000, "0");
     tree.group[1].delta_mA = 1000;
-    taper_rooms_open(&rooms, &tree.config, &tree.supply);
-    TEST_ASSERT_EQUAL_UINT8(4, rooms.kinds);
+    TEST_ASSERT_EQUAL_UINT8(4, tree_rows(&tree)->count);
 }
 
 static void test_what_is_taken_is_taken_once_from_each_row(void) {
     taper_rooms_t rooms;
     start(1, 32000, "0");
     tree.group[0].limit_W = 7000;
-    taper_rooms_open(&rooms, &tree.config, &tree.supply);
-    const taper_booking_t booking = taper_booking_now(&tree.config, &tree.snapshot, 0);
-    taper_rooms_take(&rooms, &tree.config, 0, &booking, 10000);
-    TEST_ASSERT_EQUAL_INT64(4700000, rooms.room[0][TAPER_ROW_POWER]);
-    TEST_ASSERT_EQUAL_INT64(22000000, rooms.room[0][TAPER_ROW_L1]);
-    TEST_ASSERT_EQUAL_INT64(32000000, rooms.room[0][TAPER_ROW_L2]);
+    const taper_rows_t *rows = tree_rows(&tree);
+    taper_rooms_open(&rooms, &tree.config, rows);
+    taper_rooms_draw(&rooms, &tree.config, rows, 0, 10000);
+    TEST_ASSERT_EQUAL_UINT8(TAPER_ROW_L1, rows->kind[1]);
+    TEST_ASSERT_EQUAL_INT64(4700000, rooms.left[0][0]);  /* power */
+    TEST_ASSERT_EQUAL_INT64(22000000, rooms.left[0][1]); /* L1 */
+    TEST_ASSERT_EQUAL_INT64(32000000, rooms.left[0][2]); /* L2 */
 }
 
 static void test_ceilings_are_filled_before_any_is_rounded_up(void) {
@@ -177,7 +176,7 @@ static void allocate_beside(int32_t reserved_mA, int32_t site_W) {
     tree_add(&tree, 0, L1);
     tree_add(&tree, 0, L1);
     tree.supply.site_W = site_W;
-    taper_allocate(&tree.allocator, &tree.config, &tree.snapshot, &tree.proposal, &tree.supply, reserved,
+    taper_allocate(&tree.allocator, &tree.config, &tree.snapshot, &tree.proposal, tree_rows(&tree), reserved,
                    &tree.setpoints);
 }
 

@@ -194,7 +194,7 @@ static void test_limits_hold_for_a_hundred_thousand_hostile_proposals_on_any_tre
         }
         vary();
         tree.snapshot.now_ms += below(200000);
-        taper_allocate(&tree.allocator, &tree.config, &tree.snapshot, &tree.proposal, &tree.supply,
+        taper_allocate(&tree.allocator, &tree.config, &tree.snapshot, &tree.proposal, tree_rows(&tree),
                        reserved_mA, &tree.setpoints);
         TEST_ASSERT_TRUE(tree_guard(&tree));
         for (uint8_t k = 0; k < tree.config.group_count; k++) {

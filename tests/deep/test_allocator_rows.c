@@ -161,14 +161,14 @@ static void test_what_is_reserved_is_taken_from_every_row(void) {
     tree.group[leaf].limit_mA = 30000;
     tree.group[0].limit_W = 12000;
     int32_t reserved_mA[TAPER_MAX_CONNECTORS] = {0, 10000, 0};
-    taper_allocate(&tree.allocator, &tree.config, &tree.snapshot, &tree.proposal, &tree.supply, reserved_mA,
-                   &tree.setpoints);
+    taper_allocate(&tree.allocator, &tree.config, &tree.snapshot, &tree.proposal, tree_rows(&tree),
+                   reserved_mA, &tree.setpoints);
     TEST_ASSERT_EQUAL_INT32(16100, given(0)); /* 5100 W left: 6 A for the other, the rest here */
     TEST_ASSERT_EQUAL_INT32(0, given(1));
     TEST_ASSERT_EQUAL_INT32(6000, given(2));
     tree.group[0].limit_W = 100000;
-    taper_allocate(&tree.allocator, &tree.config, &tree.snapshot, &tree.proposal, &tree.supply, reserved_mA,
-                   &tree.setpoints);
+    taper_allocate(&tree.allocator, &tree.config, &tree.snapshot, &tree.proposal, tree_rows(&tree),
+                   reserved_mA, &tree.setpoints);
     TEST_ASSERT_EQUAL_INT32(20000, given(0));
     TEST_ASSERT_EQUAL_INT32(20000, given(2));
 }
@@ -181,8 +181,8 @@ static void test_an_overdrawn_row_gives_nothing_to_those_with_a_weight_in_it(voi
     tree.snapshot.demand[1].active = false;
     tree.group[leaf].limit_mA = 10000;
     const int32_t reserved_mA[TAPER_MAX_CONNECTORS] = {0, 10001, 0};
-    taper_allocate(&tree.allocator, &tree.config, &tree.snapshot, &tree.proposal, &tree.supply, reserved_mA,
-                   &tree.setpoints);
+    taper_allocate(&tree.allocator, &tree.config, &tree.snapshot, &tree.proposal, tree_rows(&tree),
+                   reserved_mA, &tree.setpoints);
     TEST_ASSERT_EQUAL_INT32(0, given(0));
     TEST_ASSERT_EQUAL_INT32(10000, given(2));
 }
@@ -225,17 +225,17 @@ static void test_rooms_say_what_is_left_and_what_is_overdrawn(void) {
     taper_rooms_t rooms;
     tree_add(&tree, leaf, L1);
     tree.group[1].limit_mA = 20000;
-    taper_rooms_open(&rooms, &tree.config, &tree.supply);
-    TEST_ASSERT_EQUAL_UINT8(4, rooms.kinds); /* power, and three phases */
-    const taper_booking_t booking = taper_booking_now(&tree.config, &tree.snapshot, 0);
-    TEST_ASSERT_EQUAL_INT32(20000, taper_rooms_left_mA(&rooms, &tree.config, 0, &booking));
-    taper_rooms_take(&rooms, &tree.config, 0, &booking, 20000);
-    TEST_ASSERT_EQUAL_INT32(0, taper_rooms_left_mA(&rooms, &tree.config, 0, &booking));
-    const taper_weights_t weights = taper_rooms_weigh(&rooms, &booking);
-    TEST_ASSERT_EQUAL_INT32(0, taper_rooms_fit_mA(&rooms, &tree.config, 0, &weights, 0));
-    taper_rooms_take(&rooms, &tree.config, 0, &booking, 1);
-    TEST_ASSERT_EQUAL_INT32(-1, taper_rooms_left_mA(&rooms, &tree.config, 0, &booking));
-    TEST_ASSERT_EQUAL_INT32(-1, taper_rooms_fit_mA(&rooms, &tree.config, 0, &weights, 0));
+    const taper_rows_t *rows = tree_rows(&tree);
+    taper_rooms_open(&rooms, &tree.config, rows);
+    TEST_ASSERT_EQUAL_UINT8(4, rows->sums); /* power, and three phases */
+    TEST_ASSERT_EQUAL_INT32(20000, taper_rooms_fit_mA(&rooms, &tree.config, rows, 0, INT32_MAX));
+    TEST_ASSERT_EQUAL_INT32(19999, taper_rooms_fit_mA(&rooms, &tree.config, rows, 0, 19999));
+    taper_rooms_draw(&rooms, &tree.config, rows, 0, 20000);
+    TEST_ASSERT_EQUAL_INT32(0, taper_rooms_fit_mA(&rooms, &tree.config, rows, 0, INT32_MAX));
+    TEST_ASSERT_EQUAL_INT32(0, taper_rooms_fit_mA(&rooms, &tree.config, rows, 0, 0));
+    taper_rooms_draw(&rooms, &tree.config, rows, 0, 1);
+    TEST_ASSERT_EQUAL_INT32(-1, taper_rooms_fit_mA(&rooms, &tree.config, rows, 0, INT32_MAX));
+    TEST_ASSERT_EQUAL_INT32(-1, taper_rooms_fit_mA(&rooms, &tree.config, rows, 0, 0));
 }
 
 static void test_the_least_weight_counts(void) {
@@ -243,18 +243,18 @@ static void test_the_least_weight_counts(void) {
     tree_add(&tree, leaf, L1);
     tree.snapshot.demand[0].booking.permille = 1;
     tree.group[leaf].limit_mA = 9;
-    taper_rooms_open(&rooms, &tree.config, &tree.supply);
-    const taper_booking_t booking = taper_booking_now(&tree.config, &tree.snapshot, 0);
-    TEST_ASSERT_EQUAL_INT32(9000, taper_rooms_left_mA(&rooms, &tree.config, 0, &booking));
+    const taper_rows_t *rows = tree_rows(&tree);
+    taper_rooms_open(&rooms, &tree.config, rows);
+    TEST_ASSERT_EQUAL_INT32(9000, taper_rooms_fit_mA(&rooms, &tree.config, rows, 0, INT32_MAX));
 }
 
 static void test_rooms_without_any_limit_have_all_that_an_integer_holds(void) {
     taper_rooms_t rooms;
     tree_add(&tree, leaf, L1);
     tree.group[0].limit_W = 0;
-    taper_rooms_open(&rooms, &tree.config, &tree.supply);
-    const taper_booking_t booking = taper_booking_now(&tree.config, &tree.snapshot, 0);
-    TEST_ASSERT_EQUAL_INT32(INT32_MAX, taper_rooms_left_mA(&rooms, &tree.config, 0, &booking));
+    const taper_rows_t *rows = tree_rows(&tree);
+    taper_rooms_open(&rooms, &tree.config, rows);
+    TEST_ASSERT_EQUAL_INT32(INT32_MAX, taper_rooms_fit_mA(&rooms, &tree.config, rows, 0, INT32_MAX));
 }
 
 int main(void) {

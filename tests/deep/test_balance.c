@@ -24,7 +24,7 @@ static uint8_t add(uint8_t group, uint8_t lines, int32_t current_mA) {
 }
 
 static void balance(void) {
-    taper_balance(&tree.config, &tree.snapshot, rank, &tree.setpoints);
+    taper_balance(&tree.config, &tree.snapshot, tree_rows(&tree), rank, &tree.setpoints);
     TEST_ASSERT_TRUE(tree_guard(&tree));
 }
 

@@ -103,8 +103,14 @@ void tree_assert_just_enough(const tree_t *tree, int32_t *limit, int32_t enough)
     *limit = enough;
 }
 
+const taper_rows_t *tree_rows(const tree_t *tree) {
+    static taper_rows_t rows;
+    taper_rows_now(&rows, &tree->config, &tree->snapshot, &tree->supply);
+    return &rows;
+}
+
 int32_t tree_allocate(tree_t *tree) {
-    taper_allocate(&tree->allocator, &tree->config, &tree->snapshot, &tree->proposal, &tree->supply, NULL,
+    taper_allocate(&tree->allocator, &tree->config, &tree->snapshot, &tree->proposal, tree_rows(tree), NULL,
                    &tree->setpoints);
     TEST_ASSERT_TRUE(tree_guard(tree));
     return tree->setpoints.current_mA[0];

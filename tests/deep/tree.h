@@ -40,6 +40,9 @@ void tree_wish(tree_t *tree, uint8_t i, int32_t wish_mA, int32_t ceiling_mA);
 /** Departure so late that the laxity of connector `i` is this. */
 void tree_laxity(tree_t *tree, uint8_t i, int32_t laxity_s);
 
+/** The rows of now; overwritten by the next call. */
+const taper_rows_t *tree_rows(const tree_t *tree);
+
 /** Allocate; the guard has to pass it. @return the current of connector 0. */
 int32_t tree_allocate(tree_t *tree);
 

@@ -39,22 +39,14 @@ static uint32_t take_the_newest(uint32_t sent) {
     return first;
 }
 
-static void test_a_full_receive_queue_drops_its_oldest_frames_and_counts_them(void) {
+static void test_a_full_receive_queue_drops_its_oldest_frames_counts_them_and_goes_on(void) {
     TEST_ASSERT_EQUAL_UINT32(0, overflows());
     const uint32_t lost = take_the_newest(flood());
-    if (counts()) {
-        TEST_ASSERT_EQUAL_UINT32(lost, overflows());
-    }
-}
-
-static void test_after_an_overflow_frames_come_as_before_and_the_count_stays(void) {
-    (void)take_the_newest(flood());
-    const uint32_t lost = overflows();
-    taper_frame_t frame = expect_numbered(MANY);
-    expect_say(&frame);
-    frame = expect_received();
+    const taper_frame_t next = expect_numbered(MANY);
+    expect_say(&next);
+    const taper_frame_t frame = expect_received();
     TEST_ASSERT_EQUAL_UINT32(MANY, expect_number_of(&frame));
-    TEST_ASSERT_EQUAL_UINT32(lost, overflows());
+    TEST_ASSERT_EQUAL_UINT32(counts() ? lost : 0, overflows());
 }
 
 /** The station sends until it is refused. @return how many were taken. */
@@ -77,36 +69,27 @@ static void send_patiently(const taper_frame_t *frame) {
     }
 }
 
-static void test_a_full_send_queue_refuses_and_all_that_was_taken_arrives_in_order(void) {
-    rig.jam(true);
-    const uint32_t taken = fill();
-    rig.jam(false);
-    for (uint32_t number = 0; number < taken; number++) {
-        const taper_frame_t frame = expect_heard();
-        TEST_ASSERT_EQUAL_UINT32(number, expect_number_of(&frame));
-    }
-    expect_nothing_heard();
+static void assert_heard(uint32_t number) {
+    const taper_frame_t frame = expect_heard();
+    TEST_ASSERT_EQUAL_UINT32(number, expect_number_of(&frame));
 }
 
-static void test_after_a_jam_frames_leave_as_before(void) {
+static void test_a_full_send_queue_refuses_delivers_all_that_it_took_and_goes_on(void) {
     rig.jam(true);
     const uint32_t taken = fill();
     rig.jam(false);
     for (uint32_t number = 0; number < taken; number++) {
-        (void)expect_heard();
+        assert_heard(number);
     }
-    for (uint32_t number = 0; number < 100; number++) {
+    for (uint32_t number = 0; number < 20; number++) {
         const taper_frame_t frame = expect_numbered(number);
         send_patiently(&frame);
-        const taper_frame_t heard = expect_heard();
-        TEST_ASSERT_EQUAL_UINT32(number, expect_number_of(&heard));
+        assert_heard(number);
     }
     expect_nothing_heard();
 }
 
 void expect_queues(void) {
-    RUN_TEST(test_a_full_receive_queue_drops_its_oldest_frames_and_counts_them);
-    RUN_TEST(test_after_an_overflow_frames_come_as_before_and_the_count_stays);
-    RUN_TEST(test_a_full_send_queue_refuses_and_all_that_was_taken_arrives_in_order);
-    RUN_TEST(test_after_a_jam_frames_leave_as_before);
+    RUN_TEST(test_a_full_receive_queue_drops_its_oldest_frames_counts_them_and_goes_on);
+    RUN_TEST(test_a_full_send_queue_refuses_delivers_all_that_it_took_and_goes_on);
 }

@@ -61,12 +61,15 @@ typedef struct {
     /** The controller leaves the bus, to come back when restart_bus() asks. NULL with has.bus_is_off false. */
     void (*bus_off)(void);
 
+    /** TAPER_STORE_RECORD_MAX where the port was built; at most that of here. NULL with has.store false. */
+    uint32_t (*record_max)(void);
+
     /** Power goes and comes back at the station: its store stays, what waited is gone. */
     void (*restart)(void);
 
     /**
-     * Power goes in the next write to the store, after `bytes` of it: the write answers false. NULL: a write of this store is
-     * done or not done, and cannot be cut.
+     * Power goes in the next write to the store, after `bytes` of it: the write answers false. NULL: there is no way to cut a
+     * write of this port from here.
      */
     void (*tear_next_write)(uint32_t bytes);
 } rig_t;

@@ -45,6 +45,10 @@ static void bus_off(void) {
     taper_membus_bus_off(&bus, 0, 1);
 }
 
+static uint32_t record_max(void) {
+    return TAPER_STORE_RECORD_MAX;
+}
+
 static void restart(void) {
     taper_membus_power_cycle(&bus);
 }
@@ -67,6 +71,7 @@ const rig_t rig = {
     .hear = hear,
     .jam = jam,
     .bus_off = bus_off,
+    .record_max = record_max,
     .restart = restart,
     .tear_next_write = tear_next_write,
 };

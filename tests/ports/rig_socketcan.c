@@ -174,6 +174,10 @@ static void start(uint32_t begin_ms) {
     open_world();
 }
 
+static uint32_t record_max(void) {
+    return TAPER_STORE_RECORD_MAX;
+}
+
 static void restart(void) {
     taper_socketcan_close(&can);
     open_port();
@@ -222,6 +226,7 @@ const rig_t rig = {
     .hear = hear,
     .jam = jam,
     .bus_off = bus_off,
+    .record_max = record_max,
     .restart = restart,
 };
 

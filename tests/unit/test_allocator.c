@@ -16,7 +16,8 @@ void tearDown(void) {}
 static void allocate(const taper_station_config_t *config, const taper_snapshot_t *snapshot,
                      const taper_proposal_t *proposal, int32_t site_limit_W) {
     const taper_supply_t supply = taper_supply_of_W(site_limit_W);
-    taper_allocate(&allocator, config, snapshot, proposal, &supply, NULL, &setpoints);
+    taper_allocate(&allocator, config, snapshot, proposal, scene_rows(config, snapshot, &supply), NULL,
+                   &setpoints);
 }
 
 static int64_t power_mW(const taper_snapshot_t *snapshot, uint8_t first, uint8_t last) {

@@ -23,7 +23,8 @@ void tearDown(void) {}
 static void allocate(int32_t wish_W, int32_t site_limit_W) {
     const taper_supply_t supply = taper_supply_of_W(site_limit_W);
     const taper_proposal_t proposal = scene_proposal(wish_W);
-    taper_allocate(&allocator, scene_four(), &snapshot, &proposal, &supply, reserved_mA, &setpoints);
+    taper_allocate(&allocator, scene_four(), &snapshot, &proposal,
+                   scene_rows(scene_four(), &snapshot, &supply), reserved_mA, &setpoints);
     TEST_ASSERT_TRUE(taper_guard_passes(scene_four(), &snapshot, &supply, &setpoints));
 }
 

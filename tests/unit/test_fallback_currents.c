@@ -42,6 +42,8 @@ void setUp(void) {
 }
 void tearDown(void) {}
 
+static const taper_supply_t supply; /* what the site may have now does not matter */
+
 /** In tenths of an ampere at 230 V. */
 static int32_t W_of_dA(int32_t current_dA) {
     return current_dA * 23;
@@ -50,7 +52,8 @@ static int32_t W_of_dA(int32_t current_dA) {
 static void choose(int32_t failsafe_W) {
     memset(&fallback, 0x55, sizeof fallback);
     fallback.current_mA[4] = 0;
-    taper_ledger_grant_fallback(&ledger, &config, &snapshot, rank, failsafe_W, &granted, &fallback);
+    taper_ledger_grant_fallback(&ledger, &config, &snapshot, scene_rows(&config, &snapshot, &supply), rank,
+                                failsafe_W, &granted, &fallback);
     TEST_ASSERT_TRUE(
         taper_guard_fallback_passes(&ledger, &config, &snapshot, failsafe_W, &granted, &fallback));
 }
@@ -259,7 +262,8 @@ static void test_who_is_not_there_is_left_alone(void) {
     choose(10000);
     TEST_ASSERT_EQUAL_INT32(0, fallback.current_mA[4]);
     fallback.current_mA[4] = 777;
-    taper_ledger_grant_fallback(&ledger, &config, &snapshot, rank, 0, &granted, &fallback);
+    taper_ledger_grant_fallback(&ledger, &config, &snapshot, scene_rows(&config, &snapshot, &supply), rank, 0,
+                                &granted, &fallback);
     TEST_ASSERT_EQUAL_INT32(777, fallback.current_mA[4]);
 }
 
@@ -269,7 +273,8 @@ static void test_what_is_not_there_takes_no_room_and_nobody_stands_behind_the_la
     choose(W_of_dA(340));
     assert_chosen(10000, 10000, 8000, 6000);
     send_and_echo_all();
-    taper_ledger_grant_fallback(&ledger, &config, &snapshot, longer, W_of_dA(340), &granted, &fallback);
+    taper_ledger_grant_fallback(&ledger, &config, &snapshot, scene_rows(&config, &snapshot, &supply), longer,
+                                W_of_dA(340), &granted, &fallback);
     assert_chosen(10000, 10000, 8000, 0);
 }
 

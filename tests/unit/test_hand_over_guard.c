@@ -184,7 +184,8 @@ static void test_what_is_granted_tilts_no_group_though_others_are_held_back(void
     groups[1].limit_mA = 20000;
     groups[1].imbalance_mA = 10000;
     bench_may_draw(2, 20000); /* leaves the other nothing on its phase */
-    taper_ledger_grant(&ledger, &config, &snapshot, rank, &supply, &target, &granted);
+    taper_ledger_grant(&ledger, &config, &snapshot, rank, scene_rows(&config, &snapshot, &supply), &target,
+                       &granted);
     TEST_ASSERT_EQUAL_INT32(10000, granted.current_mA[0]);
     TEST_ASSERT_EQUAL_INT32(0, granted.current_mA[1]);
 }
@@ -225,7 +226,8 @@ static void test_the_guard_agrees_with_what_is_granted(void) {
             bench_may_draw(i, (int32_t)(scene_random(&state) % 200) * 100);
             target.current_mA[i] = (int32_t)(60 + scene_random(&state) % 300) * 100;
         }
-        taper_ledger_grant(&ledger, &config, &snapshot, rank, &supply, &target, &granted);
+        taper_ledger_grant(&ledger, &config, &snapshot, rank, scene_rows(&config, &snapshot, &supply),
+                           &target, &granted);
         TEST_ASSERT_TRUE(bench_passes());
         granted = target;
         refused += bench_passes() ? 0 : 1;

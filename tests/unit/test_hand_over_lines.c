@@ -1,5 +1,6 @@
 /* The guard of the hand-over where connectors are between two lines, and on the delta side of a transformer. */
 #include "hand_over_bench.h"
+#include "scene.h"
 #include "unity.h"
 
 void setUp(void) {
@@ -157,7 +158,8 @@ static void test_a_delta_line_that_is_above_its_limit_by_one_pair_gets_no_more_o
     groups[1].delta_mA = 30000;
     bench_may_draw(1, 12000);
     bench_may_draw(2, 6100); /* line c: CA + 2 BC are 0.1 A too much, AB + 2 BC are not; all three: 30.05 A */
-    taper_ledger_grant(&ledger, &config, &snapshot, rank, &supply, &target, &granted);
+    taper_ledger_grant(&ledger, &config, &snapshot, rank, scene_rows(&config, &snapshot, &supply), &target,
+                       &granted);
     TEST_ASSERT_EQUAL_INT32(0, granted.current_mA[0]);
     TEST_ASSERT_EQUAL_INT32(5800, granted.current_mA[3]); /* line a: BC + 2 CA are 24.2 A */
     TEST_ASSERT_EQUAL_INT32(6000, granted.current_mA[4]); /* another group */
@@ -165,7 +167,8 @@ static void test_a_delta_line_that_is_above_its_limit_by_one_pair_gets_no_more_o
     bench_grant(3, 0);
     TEST_ASSERT_FALSE(bench_passes());
     groups[1].delta_mA = 30100;
-    taper_ledger_grant(&ledger, &config, &snapshot, rank, &supply, &target, &granted);
+    taper_ledger_grant(&ledger, &config, &snapshot, rank, scene_rows(&config, &snapshot, &supply), &target,
+                       &granted);
     TEST_ASSERT_EQUAL_INT32(6000, granted.current_mA[0]);
     TEST_ASSERT_TRUE(bench_passes());
 }
@@ -183,7 +186,8 @@ static void test_that_holds_for_each_line_of_each_group(void) {
             groups[group].delta_mA = 30000;
             bench_may_draw(1, 12000);
             bench_may_draw(2, 6100);
-            taper_ledger_grant(&ledger, &config, &snapshot, rank, &supply, &target, &granted);
+            taper_ledger_grant(&ledger, &config, &snapshot, rank, scene_rows(&config, &snapshot, &supply),
+                               &target, &granted);
             TEST_ASSERT_EQUAL_INT32(0, granted.current_mA[0]);
             TEST_ASSERT_EQUAL_INT32(group == 0 ? 0 : 6000, granted.current_mA[4]);
         }

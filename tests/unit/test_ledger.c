@@ -54,7 +54,8 @@ static bool hand_over_passes(int32_t site_limit_W) {
 
 static void grant(int32_t site_limit_W) {
     const taper_supply_t supply = taper_supply_of_W(site_limit_W);
-    taper_ledger_grant(&ledger, scene_four(), &snapshot, rank, &supply, &target, &granted);
+    taper_ledger_grant(&ledger, scene_four(), &snapshot, rank, scene_rows(scene_four(), &snapshot, &supply),
+                       &target, &granted);
     TEST_ASSERT_TRUE(taper_guard_hand_over_passes(&ledger, scene_four(), &snapshot, &supply, &granted));
 }
 
@@ -307,12 +308,14 @@ static void test_who_is_ranked_twice_takes_its_room_once_and_who_stands_behind_t
     target.current_mA[0] = 10000;
     target.current_mA[2] = 20000;
     target.current_mA[3] = 10000;
-    taper_ledger_grant(&ledger, scene_four(), &snapshot, longer, &supply, &target, &granted);
+    taper_ledger_grant(&ledger, scene_four(), &snapshot, longer, scene_rows(scene_four(), &snapshot, &supply),
+                       &target, &granted);
     TEST_ASSERT_EQUAL_INT32(10000, granted.current_mA[0]);
     TEST_ASSERT_EQUAL_INT32(20000, granted.current_mA[2]);
     TEST_ASSERT_EQUAL_INT32(0, granted.current_mA[3]);
     target.current_mA[2] = 30000;
-    taper_ledger_grant(&ledger, scene_four(), &snapshot, longer, &supply, &target, &granted);
+    taper_ledger_grant(&ledger, scene_four(), &snapshot, longer, scene_rows(scene_four(), &snapshot, &supply),
+                       &target, &granted);
     TEST_ASSERT_EQUAL_INT32(30000, granted.current_mA[2]);
 }
 

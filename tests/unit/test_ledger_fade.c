@@ -193,7 +193,8 @@ static void test_nobody_is_told_more_than_last_while_a_level_fades_above_the_lim
     bench_wait_ms(1);
     bench_send(1, 6000, 0);
     bench_hear_echo(1);
-    taper_ledger_grant(&ledger, &config, &snapshot, rank, &supply, &target, &granted);
+    taper_ledger_grant(&ledger, &config, &snapshot, rank, scene_rows(&config, &snapshot, &supply), &target,
+                       &granted);
     TEST_ASSERT_EQUAL_INT32(6000, granted.current_mA[0]);
     TEST_ASSERT_TRUE(taper_guard_hand_over_passes(&ledger, &config, &snapshot, &supply, &granted));
 }
@@ -211,12 +212,14 @@ static void test_while_one_fades_no_other_gets_its_room(void) {
     bench_wait_ms(1);
     bench_send(1, 6000, 0);
     bench_hear_echo(1);
-    taper_ledger_grant(&ledger, &config, &snapshot, rank, &supply, &target, &granted);
+    taper_ledger_grant(&ledger, &config, &snapshot, rank, scene_rows(&config, &snapshot, &supply), &target,
+                       &granted);
     TEST_ASSERT_EQUAL_INT32(24000, granted.current_mA[2]);
     bench_wait_ms(2000);
     bench_send(2, 6000, 0);
     bench_wait_ms(REACTION_ms - 2000);
-    taper_ledger_grant(&ledger, &config, &snapshot, rank, &supply, &target, &granted);
+    taper_ledger_grant(&ledger, &config, &snapshot, rank, scene_rows(&config, &snapshot, &supply), &target,
+                       &granted);
     TEST_ASSERT_EQUAL_INT32(30000, granted.current_mA[2]);
 }
 
@@ -231,11 +234,13 @@ static void test_who_is_not_there_takes_no_room_and_is_granted_nothing(void) {
         taper_ledger_hear(&ledger, i, &empty, now_ms);
     }
     ledger.entry[4].drawn_mA = 32000;
-    taper_ledger_grant(&ledger, &config, &snapshot, rank, &supply, &target, &granted);
+    taper_ledger_grant(&ledger, &config, &snapshot, rank, scene_rows(&config, &snapshot, &supply), &target,
+                       &granted);
     TEST_ASSERT_EQUAL_INT32(32000, granted.current_mA[2]);
     TEST_ASSERT_EQUAL_INT32(777, granted.current_mA[4]);
     ledger.entry[4].drawn_mA = 0;
-    taper_ledger_grant(&ledger, &config, &snapshot, rank, &supply, &target, &granted);
+    taper_ledger_grant(&ledger, &config, &snapshot, rank, scene_rows(&config, &snapshot, &supply), &target,
+                       &granted);
     TEST_ASSERT_EQUAL_INT32(777, granted.current_mA[4]);
 }
 

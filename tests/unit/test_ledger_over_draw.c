@@ -78,11 +78,13 @@ static void test_nobody_gets_the_room_of_who_over_draws_and_he_no_more_than_last
     }
     bench_send(0, 10000, 0);
     bench_hear_draw(0, 20000, 0, 0);
-    taper_ledger_grant(&ledger, &config, &snapshot, rank, &supply, &target, &granted);
+    taper_ledger_grant(&ledger, &config, &snapshot, rank, scene_rows(&config, &snapshot, &supply), &target,
+                       &granted);
     TEST_ASSERT_EQUAL_INT32(15000, granted.current_mA[0]); /* paid for already */
     TEST_ASSERT_EQUAL_INT32(10000, granted.current_mA[2]);
     bench_hear_draw(0, 31000, 0, 0);
-    taper_ledger_grant(&ledger, &config, &snapshot, rank, &supply, &target, &granted);
+    taper_ledger_grant(&ledger, &config, &snapshot, rank, scene_rows(&config, &snapshot, &supply), &target,
+                       &granted);
     TEST_ASSERT_EQUAL_INT32(10000, granted.current_mA[0]);
     TEST_ASSERT_EQUAL_INT32(0, granted.current_mA[2]);
 }

@@ -279,7 +279,8 @@ static void think(void) {
         proposal.wish_W[i] = proposal.ceiling_W[i] = (int32_t)below(8000);
         proposal.rank[i] = (uint8_t)((i + below(2)) % CONNECTORS);
     }
-    taper_allocate(&allocator, &config, &snapshot, &proposal, &supply, reserved_mA, &target);
+    taper_allocate(&allocator, &config, &snapshot, &proposal, scene_rows(&config, &snapshot, &supply),
+                   reserved_mA, &target);
     tick_ms = now_ms;
 }
 
@@ -317,10 +318,12 @@ static void run_station(void) {
     if (taper_elapsed_ms(now_ms, tick_ms) >= 1000) {
         think();
     }
-    taper_ledger_grant(&ledger, &config, &snapshot, proposal.rank, &supply, &target, &granted);
+    taper_ledger_grant(&ledger, &config, &snapshot, proposal.rank, scene_rows(&config, &snapshot, &supply),
+                       &target, &granted);
     TEST_ASSERT_TRUE(taper_guard_passes(&config, &snapshot, &supply, &granted));
     TEST_ASSERT_TRUE(taper_guard_hand_over_passes(&ledger, &config, &snapshot, &supply, &granted));
-    taper_ledger_grant_fallback(&ledger, &config, &snapshot, proposal.rank, FAILSAFE_W, &granted, &fallback);
+    taper_ledger_grant_fallback(&ledger, &config, &snapshot, scene_rows(&config, &snapshot, &supply),
+                                proposal.rank, FAILSAFE_W, &granted, &fallback);
     TEST_ASSERT_TRUE(
         taper_guard_fallback_passes(&ledger, &config, &snapshot, FAILSAFE_W, &granted, &fallback));
     for (uint8_t i = 0; i < CONNECTORS; i++) {

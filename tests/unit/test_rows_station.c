@@ -98,6 +98,60 @@ static void test_the_supply_bounds_what_the_site_has_limits_for(void) {
     TEST_ASSERT_EQUAL_INT32(50000, taper_row_limit_now(&station, &ample, 0, TAPER_ROW_POWER));
 }
 
+static void test_the_rows_of_now_are_those_that_some_group_limits_sums_first(void) {
+    static const uint8_t kinds[] = {
+        TAPER_ROW_POWER,      TAPER_ROW_L1,       TAPER_ROW_L2,         TAPER_ROW_L3,
+        TAPER_ROW_L1_B,       TAPER_ROW_L2_B,     TAPER_ROW_L3_B,       TAPER_ROW_DELTA_L1,
+        TAPER_ROW_DELTA_L2,   TAPER_ROW_DELTA_L3, TAPER_ROW_DELTA_L1_B, TAPER_ROW_DELTA_L2_B,
+        TAPER_ROW_DELTA_L3_B, TAPER_ROW_L1_L2,    TAPER_ROW_L2_L3,      TAPER_ROW_L3_L1};
+    const taper_supply_t ample = taper_supply_of_W(90000);
+    taper_rows_t rows;
+    taper_rows_now(&rows, &station, &snapshot, &ample);
+    TEST_ASSERT_EQUAL_UINT8(16, rows.count);
+    TEST_ASSERT_EQUAL_UINT8(13, rows.sums);
+    TEST_ASSERT_EQUAL_MEMORY(kinds, rows.kind, sizeof kinds);
+    taper_station_config_t alone = station;
+    alone.group_count = 1;
+    alone.line_to_line = false;
+    taper_rows_now(&rows, &alone, &snapshot, &ample);
+    TEST_ASSERT_EQUAL_UINT8(4, rows.count);
+    TEST_ASSERT_EQUAL_UINT8(4, rows.sums);
+    TEST_ASSERT_EQUAL_MEMORY(kinds, rows.kind, 4);
+}
+
+static void test_the_rows_of_now_are_bounded_by_what_the_site_may_have_now(void) {
+    const taper_supply_t supply = {.site_W = 40000, .phase_mA = {150000, -5, TAPER_NO_LIMIT}};
+    taper_rows_t rows;
+    taper_rows_now(&rows, &station, &snapshot, &supply);
+    for (uint8_t k = 0; k < station.group_count; k++) {
+        for (uint8_t row = 0; row < rows.count; row++) {
+            const taper_row_kind_t kind = (taper_row_kind_t)rows.kind[row];
+            TEST_ASSERT_EQUAL_INT32(taper_row_limit_now(&station, &supply, k, kind), rows.limit[k][row]);
+        }
+    }
+    TEST_ASSERT_EQUAL_INT32(150000, rows.limit[0][1]);
+    TEST_ASSERT_EQUAL_INT32(63000, rows.limit[2][1]);
+}
+
+static void test_what_counts_in_the_rows_of_now_is_what_the_snapshot_says(void) {
+    const taper_supply_t ample = taper_supply_of_W(90000);
+    taper_rows_t rows;
+    snapshot.demand[PLAIN].booking = (taper_booking_t){.W_per_A = 250, .permille = 1000, .phases = L2};
+    taper_rows_now(&rows, &station, &snapshot, &ample);
+    for (uint8_t i = 0; i < station.connector_count; i++) {
+        const taper_booking_t booking = taper_booking_now(&station, &snapshot, i);
+        TEST_ASSERT_EQUAL_INT32(booking.W_per_A, rows.booking[i].W_per_A);
+        TEST_ASSERT_EQUAL_UINT8(booking.phases, rows.booking[i].phases);
+        for (uint8_t row = 0; row < rows.count; row++) {
+            TEST_ASSERT_EQUAL_INT32(taper_row_weight(&booking, (taper_row_kind_t)rows.kind[row]),
+                                    rows.weight[i][row]);
+        }
+    }
+    TEST_ASSERT_EQUAL_INT32(250, rows.weight[PLAIN][0]);
+    TEST_ASSERT_EQUAL_INT32(0, rows.weight[PLAIN][1]);
+    TEST_ASSERT_EQUAL_INT32(1000, rows.weight[PLAIN][2]);
+}
+
 static void assert_booking(int32_t W_per_A, int32_t permille, uint8_t phases, uint8_t i) {
     const taper_booking_t booking = taper_booking_nominal(&station, i);
     TEST_ASSERT_EQUAL_INT32(W_per_A, booking.W_per_A);
@@ -269,6 +323,9 @@ int main(void) {
     RUN_TEST(test_limits_come_from_the_description);
     RUN_TEST(test_without_connectors_between_lines_there_is_no_second_row);
     RUN_TEST(test_the_supply_bounds_what_the_site_has_limits_for);
+    RUN_TEST(test_the_rows_of_now_are_those_that_some_group_limits_sums_first);
+    RUN_TEST(test_the_rows_of_now_are_bounded_by_what_the_site_may_have_now);
+    RUN_TEST(test_what_counts_in_the_rows_of_now_is_what_the_snapshot_says);
     RUN_TEST(test_a_connector_counts_by_its_description_with_volts_and_losses_rounded_up);
     RUN_TEST(test_what_a_converter_counts_is_exact_where_nothing_is_to_be_rounded);
     RUN_TEST(test_what_is_told_of_who_is_not_active_counts_however_little);

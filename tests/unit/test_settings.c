@@ -3,7 +3,9 @@
 
 #include <string.h>
 
+#include "taper/crc32.h"
 #include "taper/membus.h"
+#include "taper/planner.h"
 #include "taper/stations.h"
 #include "unity.h"
 
@@ -134,7 +136,7 @@ static void test_of_settings_with_one_that_is_out_of_range_none_is_used(void) {
     bad[9].price_weight_permille = 1001;
     bad[10].price_weight_permille = -1;
     bad[11].tick_ms = UINT32_MAX;
-    bad[12].iterations_per_tick = 9;
+    bad[12].iterations_per_tick = TAPER_MAX_ITERATIONS + 1;
     bad[13].proposer = TAPER_PROPOSER_LLF + 1;
     bad[14].limit_W = INT32_MAX;
     bad[15].limit_W = TAPER_ABSENT + 1;
@@ -247,6 +249,40 @@ static void test_every_single_bit_that_rots_in_either_copy_is_found_and_mended(v
     }
 }
 
+/** Give a copy another sequence and another limit. */
+static void forge(unsigned copy, uint32_t sequence, uint8_t limit_low) {
+    uint8_t *record = bus.store[TAPER_STORE_SETTINGS][copy].data;
+    for (unsigned i = 0; i < 4; i++) {
+        record[8 + i] = (uint8_t)(sequence >> 8 * i);
+    }
+    record[12] = limit_low;
+    const uint32_t crc = taper_crc32(record, RECORD - 4);
+    for (unsigned i = 0; i < 4; i++) {
+        record[RECORD - 4 + i] = (uint8_t)(crc >> 8 * i);
+    }
+}
+
+static void test_of_two_good_copies_the_newer_one_counts_when_the_sequence_wraps_too(void) {
+    taper_settings_t settings = all_set();
+    const int32_t base_W = settings.limit_W - settings.limit_W % 256;
+    const uint32_t newer[] = {8, 0, 5, UINT32_C(0x80000001)};
+    const uint32_t older[] = {7, UINT32_MAX, UINT32_MAX - 5, 3};
+    for (unsigned k = 0; k < sizeof newer / sizeof newer[0]; k++) {
+        for (unsigned copy = 0; copy < TAPER_STORE_COPIES; copy++) {
+            setUp();
+            TEST_ASSERT_TRUE(taper_settings_save(&port, &settings));
+            forge(copy, newer[k], 2);
+            forge(1 - copy, older[k], 1);
+            taper_settings_t found;
+            TEST_ASSERT_EQUAL(TAPER_STORED_GOOD, load(&found));
+            TEST_ASSERT_EQUAL_INT32(base_W + 2, found.limit_W);
+            bus.store[TAPER_STORE_SETTINGS][copy].data[12] ^= 1; /* the other one holds the same by now */
+            TEST_ASSERT_EQUAL(TAPER_STORED_OLD_COPY, load(&found));
+            TEST_ASSERT_EQUAL_INT32(base_W + 2, found.limit_W);
+        }
+    }
+}
+
 static void test_settings_that_are_lost_leave_the_failsafe_limit_until_they_are_set_again(void) {
     taper_settings_t settings = all_set();
     TEST_ASSERT_TRUE(taper_settings_save(&port, &settings));
@@ -297,6 +333,7 @@ int main(void) {
     RUN_TEST(test_the_bytes_are_as_the_layout_says_on_every_machine);
     RUN_TEST(test_whenever_power_goes_while_settings_are_saved_old_or_new_ones_hold);
     RUN_TEST(test_every_single_bit_that_rots_in_either_copy_is_found_and_mended);
+    RUN_TEST(test_of_two_good_copies_the_newer_one_counts_when_the_sequence_wraps_too);
     RUN_TEST(test_settings_that_are_lost_leave_the_failsafe_limit_until_they_are_set_again);
     RUN_TEST(test_settings_of_another_layout_are_refused_and_kept_until_somebody_saves);
     RUN_TEST(test_a_site_without_a_failsafe_limit_is_left_a_watt_when_settings_are_lost);

@@ -54,6 +54,22 @@ static void test_sliced_planning_charges_by_fallback_until_the_plan_is_there(voi
     TEST_ASSERT_EQUAL_UINT32(1, taper_station_counter(&bench.station, TAPER_COUNTER_PLANS));
 }
 
+static void test_short_slices_come_to_a_plan_as_well_with_less_than_ten_iterations_in_every_tick(void) {
+    taper_station_options_t with = with_solver();
+    with.iterations_per_tick = 7;
+    bench_start(&with);
+    uint16_t before = 0;
+    for (int tick = 0; tick < 100 && taper_station_mode(&bench.station) != TAPER_MODE_PLAN; tick++) {
+        bench_send_all(8, 30000);
+        bench_step();
+        const uint16_t iterations = taper_planner_iterations(&bench.station.planner);
+        TEST_ASSERT_LESS_OR_EQUAL_UINT16(7, iterations - before);
+        before = iterations;
+    }
+    TEST_ASSERT_EQUAL(TAPER_MODE_PLAN, taper_station_mode(&bench.station));
+    TEST_ASSERT_EQUAL_UINT32(1, taper_station_counter(&bench.station, TAPER_COUNTER_PLANS));
+}
+
 /** A NaN in the solver's memory, as a bit flip would leave it. */
 static void poison_solver(void) {
     static OSQPFloat poisoned[TAPER_MAX_VARIABLES];
@@ -201,6 +217,7 @@ int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_a_soc_frame_in_gives_a_setpoint_frame_out_through_every_hop);
     RUN_TEST(test_sliced_planning_charges_by_fallback_until_the_plan_is_there);
+    RUN_TEST(test_short_slices_come_to_a_plan_as_well_with_less_than_ten_iterations_in_every_tick);
     RUN_TEST(test_while_a_renewal_is_in_work_the_plan_is_followed);
     RUN_TEST(test_a_poisoned_solver_means_fallback_in_the_same_tick_and_a_new_try_after_a_minute);
     RUN_TEST(test_a_plan_ends_after_two_steps_without_a_renewal);

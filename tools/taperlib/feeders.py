@@ -44,6 +44,11 @@ def _load(name: str) -> Station:
         raise InputError(f"station {name}: {error}") from None
 
 
+def connector_count(name: str) -> int:
+    """Of a station of codegen/stations. Raises InputError."""
+    return len(_load(name).connectors)
+
+
 def _one_phase(station: Station) -> Station:
     """The same, as vehicles that use one phase only see it."""
     return replace(station, connectors=tuple(replace(connector, phases=1) for connector in station.connectors))

@@ -141,6 +141,11 @@ class Image:
         fields = [line.split() for line in lines]
         return {field[0]: int(field[1]) for field in fields if len(field) == 3 and field[1].isdigit()}
 
+    def stack_sizes(self) -> tuple[int, int]:
+        """Of the stack, and of the one for faults [B]."""
+        at = {symbol.name: symbol.address for symbol in self.symbols}
+        return at["mps2_stack_top"] - at["mps2_stack_limit"], at["mps2_fault_stack_top"] - at["mps2_stack_top"]
+
     def struct_size_B(self, typedef: str) -> int:
         """Size of a structure type, from the debugging information."""
         text = self._types

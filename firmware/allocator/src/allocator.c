@@ -10,7 +10,7 @@ typedef struct {
     const taper_station_config_t *config;
     const taper_snapshot_t *snapshot;
     const taper_proposal_t *proposal;
-    taper_weights_t weights[TAPER_MAX_CONNECTORS];
+    const taper_rows_t *rows;
     taper_rooms_t rooms;
     bool keeps;         /* `kept` is what others leave for one who has waited too long already */
     taper_rooms_t kept; /* until then: the rooms before anybody had anything */
@@ -23,13 +23,11 @@ void taper_allocator_init(taper_allocator_t *allocator) {
 }
 
 /** Rooms less what connectors draw whatever they are told. */
-static void open_rooms(round_t *round, const taper_supply_t *supply, const int32_t *reserved_mA) {
-    taper_rooms_open(&round->rooms, round->config, supply);
+static void open_rooms(round_t *round, const int32_t *reserved_mA) {
+    taper_rooms_open(&round->rooms, round->config, round->rows);
     for (uint8_t i = 0; i < round->config->connector_count; i++) {
-        const taper_booking_t booking = taper_booking_now(round->config, round->snapshot, i);
-        round->weights[i] = taper_rooms_weigh(&round->rooms, &booking);
         round->reserved_mA[i] = reserved_mA == NULL ? 0 : reserved_mA[i];
-        taper_rooms_draw(&round->rooms, round->config, i, &round->weights[i], round->reserved_mA[i]);
+        taper_rooms_draw(&round->rooms, round->config, round->rows, i, round->reserved_mA[i]);
     }
     round->keeps = false;
     round->kept = round->rooms;
@@ -37,7 +35,7 @@ static void open_rooms(round_t *round, const taper_supply_t *supply, const int32
 
 /** Current that `power_W` needs, rounded down. 1 mA carries W_per_A mW. */
 static int32_t current_of_mA(const taper_demand_t *demand, int32_t power_W) {
-    return taper_saturate_i32((int64_t)taper_max_i32(power_W, 0) * 1000 / demand->W_per_A);
+    return taper_saturate_i32(taper_quotient((int64_t)taper_max_i32(power_W, 0) * 1000, demand->W_per_A));
 }
 
 static int32_t whole_steps(int32_t current_mA) {
@@ -55,7 +53,7 @@ static int32_t unpaid_mA(const round_t *round, uint8_t i, int32_t more_mA) {
 /** How much of `more_mA` fits; negative: a row is overdrawn. */
 static int32_t fitting_mA(const round_t *round, const taper_rooms_t *rooms, uint8_t i, int32_t more_mA) {
     const int32_t beyond_mA = unpaid_mA(round, i, more_mA);
-    const int32_t fits_mA = taper_rooms_fit_mA(rooms, round->config, i, &round->weights[i], beyond_mA);
+    const int32_t fits_mA = taper_rooms_fit_mA(rooms, round->config, round->rows, i, beyond_mA);
     return fits_mA < 0 ? fits_mA : more_mA - beyond_mA + fits_mA;
 }
 
@@ -64,7 +62,7 @@ static bool fits(const round_t *round, const taper_rooms_t *rooms, uint8_t i, in
 }
 
 static void draw(round_t *round, taper_rooms_t *rooms, uint8_t i, int32_t more_mA) {
-    taper_rooms_draw(rooms, round->config, i, &round->weights[i], unpaid_mA(round, i, more_mA));
+    taper_rooms_draw(rooms, round->config, round->rows, i, unpaid_mA(round, i, more_mA));
 }
 
 /** Keep room for one who waited too long from those who would be switched on meanwhile; not for what never fits. */
@@ -172,16 +170,17 @@ static void order_for_balance(const round_t *round, const taper_queue_t *queue, 
 
 void taper_allocate(taper_allocator_t *allocator, const taper_station_config_t *config,
                     const taper_snapshot_t *snapshot, const taper_proposal_t *proposal,
-                    const taper_supply_t *supply, const int32_t *reserved_mA, taper_setpoints_t *setpoints) {
+                    const taper_rows_t *rows, const int32_t *reserved_mA, taper_setpoints_t *setpoints) {
     taper_queue_t queue;
     uint8_t order[TAPER_MAX_CONNECTORS];
     round_t round;
     round.config = config;
     round.snapshot = snapshot;
     round.proposal = proposal;
+    round.rows = rows;
     round.current_mA = setpoints->current_mA;
     memset(setpoints, 0, sizeof *setpoints);
-    open_rooms(&round, supply, reserved_mA);
+    open_rooms(&round, reserved_mA);
     taper_turns_begin(allocator, config, snapshot);
     taper_turns_line_up(allocator, config, snapshot, proposal, &queue);
     serve_minima(&round, allocator, &queue, 0, queue.wishing);
@@ -190,6 +189,6 @@ void taper_allocate(taper_allocator_t *allocator, const taper_station_config_t *
     raise_all(&round, ceiling_mA);
     raise_all(&round, ceiling_rounded_up_mA);
     order_for_balance(&round, &queue, order);
-    taper_balance(config, snapshot, order, setpoints);
+    taper_balance(config, snapshot, rows, order, setpoints);
     taper_turns_end(allocator, config, snapshot, proposal, &queue, setpoints);
 }

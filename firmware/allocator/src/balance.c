@@ -7,9 +7,8 @@
 typedef struct {
     const taper_station_config_t *config;
     const taper_snapshot_t *snapshot;
+    const taper_rows_t *rows;
     uint8_t order[TAPER_MAX_CONNECTORS]; /* every connector once, who is cut last first */
-    uint8_t phases[TAPER_MAX_CONNECTORS];
-    int32_t permille[TAPER_MAX_CONNECTORS];
     int32_t *current_mA;
 } balance_t;
 
@@ -19,6 +18,14 @@ typedef struct {
     uint8_t strong, weak; /* bits of the phases */
     int64_t excess_uA;    /* <= 0: nothing to do */
 } tilt_t;
+
+static unsigned phases_of(const balance_t *balance, uint8_t i) {
+    return balance->rows->booking[i].phases & 7u;
+}
+
+static int32_t permille_of(const balance_t *balance, uint8_t i) {
+    return balance->rows->booking[i].permille;
+}
 
 /** A rank binds nobody: whom it does not name is cut first, who is named twice stands where it was first. */
 static void order_all(balance_t *balance, const uint8_t *rank) {
@@ -43,9 +50,9 @@ static void sum_phases(const balance_t *balance, int64_t sum_uA[TAPER_MAX_GROUPS
     const taper_station_config_t *config = balance->config;
     for (uint8_t i = 0; i < config->connector_count; i++) {
         for (unsigned phase = 0; phase < PHASES; phase++) {
-            if ((balance->phases[i] >> phase & 1u) != 0u) {
+            if ((phases_of(balance, i) >> phase & 1u) != 0u) {
                 sum_uA[config->connectors[i].group][phase] +=
-                    (int64_t)balance->current_mA[i] * balance->permille[i];
+                    (int64_t)balance->current_mA[i] * permille_of(balance, i);
             }
         }
     }
@@ -57,14 +64,14 @@ static void sum_phases(const balance_t *balance, int64_t sum_uA[TAPER_MAX_GROUPS
     }
 }
 
-static tilt_t tilt_of(const taper_station_config_t *config, uint8_t k, const int64_t *sum_uA) {
+static tilt_t tilt_of(const balance_t *balance, uint8_t k, const int64_t *sum_uA) {
     unsigned strong = 0;
     unsigned weak = 0;
     for (unsigned phase = 1; phase < PHASES; phase++) {
         strong = sum_uA[phase] > sum_uA[strong] ? phase : strong;
         weak = sum_uA[phase] < sum_uA[weak] ? phase : weak;
     }
-    const int32_t limit_mA = taper_row_limit(config, k, TAPER_ROW_L1_L2);
+    const int32_t limit_mA = taper_row_limit(balance->config, k, TAPER_ROW_L1_L2);
     return (tilt_t){.group = k,
                     .strong = (uint8_t)(1u << strong),
                     .weak = (uint8_t)(1u << weak),
@@ -76,7 +83,7 @@ static tilt_t find_tilt(const balance_t *balance) {
     int64_t sum_uA[TAPER_MAX_GROUPS][PHASES] = {0};
     sum_phases(balance, sum_uA);
     for (uint8_t k = balance->config->group_count; k-- > 0;) {
-        const tilt_t tilt = tilt_of(balance->config, k, sum_uA[k]);
+        const tilt_t tilt = tilt_of(balance, k, sum_uA[k]);
         if (tilt.excess_uA > 0) {
             return tilt;
         }
@@ -86,19 +93,19 @@ static tilt_t find_tilt(const balance_t *balance) {
 
 /** Whether less current of this connector makes the tilt less: it is on the strong phase, and not on the weak one. */
 static bool helps(const balance_t *balance, const tilt_t *tilt, uint8_t i) {
-    return balance->current_mA[i] > 0 && balance->permille[i] > 0 &&
-           (balance->phases[i] & tilt->strong) != 0 && (balance->phases[i] & tilt->weak) == 0 &&
+    return balance->current_mA[i] > 0 && permille_of(balance, i) > 0 &&
+           (phases_of(balance, i) & tilt->strong) != 0 && (phases_of(balance, i) & tilt->weak) == 0 &&
            taper_group_contains(balance->config, tilt->group, i);
 }
 
 static void lower_to(balance_t *balance, tilt_t *tilt, uint8_t i, int32_t current_mA) {
-    tilt->excess_uA -= (int64_t)(balance->current_mA[i] - current_mA) * balance->permille[i];
+    tilt->excess_uA -= (int64_t)(balance->current_mA[i] - current_mA) * permille_of(balance, i);
     balance->current_mA[i] = current_mA;
 }
 
 /** As far as it takes, but not below its minimum. */
 static void lower(balance_t *balance, tilt_t *tilt, uint8_t i) {
-    const int64_t step_uA = (int64_t)TAPER_CURRENT_STEP_mA * balance->permille[i];
+    const int64_t step_uA = (int64_t)TAPER_CURRENT_STEP_mA * permille_of(balance, i);
     const int64_t steps = (tilt->excess_uA + step_uA - 1) / step_uA;
     const int64_t enough_mA = balance->current_mA[i] - steps * TAPER_CURRENT_STEP_mA;
     const int32_t min_mA = balance->snapshot->demand[i].min_mA;
@@ -113,7 +120,7 @@ static void switch_off(balance_t *balance, tilt_t *tilt, uint8_t i) {
 }
 
 static bool is_one_phase(const balance_t *balance, uint8_t i) {
-    return (balance->phases[i] & (balance->phases[i] - 1u)) == 0u;
+    return (phases_of(balance, i) & (phases_of(balance, i) - 1u)) == 0u;
 }
 
 typedef void cut_t(balance_t *balance, tilt_t *tilt, uint8_t i);
@@ -134,14 +141,16 @@ static void cut(balance_t *balance, tilt_t *tilt, cut_t *how) {
 }
 
 void taper_balance(const taper_station_config_t *config, const taper_snapshot_t *snapshot,
-                   const uint8_t *rank, taper_setpoints_t *setpoints) {
-    balance_t balance = {.config = config, .snapshot = snapshot, .current_mA = setpoints->current_mA};
-    order_all(&balance, rank);
-    for (uint8_t i = 0; i < config->connector_count; i++) {
-        const taper_booking_t booking = taper_booking_now(config, snapshot, i);
-        balance.phases[i] = booking.phases & 7u;
-        balance.permille[i] = booking.permille;
+                   const taper_rows_t *rows, const uint8_t *rank, taper_setpoints_t *setpoints) {
+    if (rows->count == rows->sums) {
+        return; /* no group limits its imbalance */
     }
+    balance_t balance;
+    balance.config = config;
+    balance.snapshot = snapshot;
+    balance.rows = rows;
+    balance.current_mA = setpoints->current_mA;
+    order_all(&balance, rank);
     /* It ends: while a group tilts, somebody on its strong phase and not on its weak one has current, so every round lowers
      * somebody. A group needs two rounds, one for each phase above its weakest, but groups within groups could pass small cuts
      * to and fro; so after as many rounds as that takes, and one per connector, each switches at least one of them off. */

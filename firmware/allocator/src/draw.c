@@ -8,7 +8,7 @@ void taper_draw_init(taper_draw_t *draw) {
 }
 
 int32_t taper_draw_tolerated_mA(int32_t allowed_mA) {
-    return taper_saturate_i32(((int64_t)allowed_mA + 500) * 11 / 10);
+    return taper_saturate_i32(taper_quotient(((int64_t)allowed_mA + 500) * 11, 10));
 }
 
 /** Note whether a condition holds now. @return whether it has held for `for_ms`. */

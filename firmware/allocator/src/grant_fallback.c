@@ -1,19 +1,18 @@
 /* The fallback currents: what all connectors draw together if this controller dies now. */
 #include "taper/ledger.h"
-#include "taper/rows.h"
 
 /** What one pass over the connectors works with. */
 typedef struct {
     const taper_ledger_t *ledger;
     const taper_station_config_t *config;
     const taper_snapshot_t *snapshot;
+    const taper_rows_t *rows;
     const taper_setpoints_t *granted;
     taper_setpoints_t *fallback;
 } choice_t;
 
 static int32_t weight_W_per_A(const choice_t *choice, uint8_t i) {
-    const taper_booking_t booking = taper_booking_now(choice->config, choice->snapshot, i);
-    return taper_row_weight(&booking, TAPER_ROW_POWER);
+    return choice->rows->booking[i].W_per_A;
 }
 
 /** Up to `current_mA`, in steps of the wire: at least the minimum current, or nothing. */
@@ -31,7 +30,7 @@ static int32_t wanted_mA(const choice_t *choice, uint8_t i) {
 
 /** Most current that `room_mW` holds. */
 static int32_t held_mA(int64_t room_mW, int32_t W_per_A) {
-    return W_per_A == 0 ? INT32_MAX : taper_saturate_i32(room_mW / W_per_A);
+    return W_per_A == 0 ? INT32_MAX : taper_saturate_i32(taper_quotient(room_mW, W_per_A));
 }
 
 /** Who accepted nothing for so long that his setpoints ran out keeps this, whatever he is told now. */
@@ -74,9 +73,10 @@ static void raise_one(const choice_t *choice, uint8_t i, int64_t *room_mW) {
 }
 
 void taper_ledger_grant_fallback(const taper_ledger_t *ledger, const taper_station_config_t *config,
-                                 const taper_snapshot_t *snapshot, const uint8_t *rank, int32_t failsafe_W,
-                                 const taper_setpoints_t *granted, taper_setpoints_t *fallback) {
-    const choice_t choice = {ledger, config, snapshot, granted, fallback};
+                                 const taper_snapshot_t *snapshot, const taper_rows_t *rows,
+                                 const uint8_t *rank, int32_t failsafe_W, const taper_setpoints_t *granted,
+                                 taper_setpoints_t *fallback) {
+    const choice_t choice = {ledger, config, snapshot, rows, granted, fallback};
     const int64_t failsafe_mW = (int64_t)taper_max_i32(failsafe_W, 0) * 1000;
     budget_t budget = {.told_mW = failsafe_mW, .beside_mW = failsafe_mW};
     int64_t room_mW = failsafe_mW;

@@ -79,20 +79,11 @@ static void add_connector(const taper_station_config_t *config, const taper_dema
     }
 }
 
-/** Loads per group, a child's in its parent's. */
-static void add_up(const taper_station_config_t *config, const taper_snapshot_t *snapshot,
-                   const int32_t *current_mA, load_t *load) {
-    memset(load, 0, config->group_count * sizeof *load);
-    for (uint8_t i = 0; i < config->connector_count; i++) {
-        add_connector(config, &snapshot->demand[i], i, current_mA[i], &load[config->connectors[i].group]);
-    }
-    for (uint8_t k = config->group_count; k-- > 1;) { /* children stand behind their parents */
-        load_t *parent = &load[config->groups[k].parent];
-        parent->power_mW += load[k].power_mW;
-        for (unsigned line = 0; line < LINES; line++) {
-            parent->line_uA[line] += load[k].line_uA[line];
-            parent->pair_uA[line] += load[k].pair_uA[line];
-        }
+static void add_load(load_t *sum, const load_t *load) {
+    sum->power_mW += load->power_mW;
+    for (unsigned line = 0; line < LINES; line++) {
+        sum->line_uA[line] += load->line_uA[line];
+        sum->pair_uA[line] += load->pair_uA[line];
     }
 }
 
@@ -107,14 +98,14 @@ static int64_t root(int64_t square) {
 }
 
 static int64_t whole_mA(int64_t current_uA) {
-    return (current_uA + 999) / 1000;
+    return taper_quotient(current_uA + 999, 1000);
 }
 
-/** Current of a line. Pairs are 60 degrees apart where they meet: sqrt(x^2 + x y + y^2). */
-static int64_t line_uA(const load_t *load, unsigned line) {
+/** Square of what two pairs bring to a line where they meet, 60 degrees apart: x^2 + x y + y^2 [mA^2]. */
+static int64_t line_square(const load_t *load, unsigned line) {
     const int64_t x_mA = whole_mA(load->pair_uA[line]);
     const int64_t y_mA = whole_mA(load->pair_uA[(line + 2u) % LINES]);
-    return load->line_uA[line] + 1000 * root(x_mA * x_mA + x_mA * y_mA + y_mA * y_mA);
+    return x_mA * x_mA + x_mA * y_mA + y_mA * y_mA;
 }
 
 /** What two windings to neutral carry, 60 degrees apart: exact for one alone, and for three phases alike. */
@@ -123,38 +114,66 @@ static int64_t windings_uA(int64_t x_uA, int64_t y_uA) {
     return x_uA + y_uA - less_uA + (less_uA * FACET_permille + 999) / 1000;
 }
 
-/** Current of a line on the delta side, times the ratio of windings: pairs add up to AB + BC - 2 CA, 120 degrees apart. */
-static int64_t delta_uA(const load_t *load, unsigned line) {
+/** What flows from lines to neutral brings to a line on the delta side. */
+static int64_t delta_windings_uA(const load_t *load, unsigned line) {
+    return windings_uA(load->line_uA[line], load->line_uA[(line + 2u) % LINES]);
+}
+
+/** And the pairs, times the ratio of windings: AB + BC - 2 CA, 120 degrees apart [mA^2]. */
+static int64_t delta_square(const load_t *load, unsigned line) {
     const int64_t a_mA = whole_mA(load->pair_uA[line]);
     const int64_t b_mA = whole_mA(load->pair_uA[(line + 1u) % LINES]);
     const int64_t c_mA = whole_mA(2 * load->pair_uA[(line + 2u) % LINES]);
-    const int64_t square = a_mA * a_mA + b_mA * b_mA + c_mA * c_mA - a_mA * b_mA + a_mA * c_mA + b_mA * c_mA;
-    return windings_uA(load->line_uA[line], load->line_uA[(line + 2u) % LINES]) + 1000 * root(square);
+    return a_mA * a_mA + b_mA * b_mA + c_mA * c_mA - a_mA * b_mA + a_mA * c_mA + b_mA * c_mA;
 }
 
-/** Whether what was `before` and is `after` now, in thousandths, may be: within the limit, or no more. */
-static bool may_be(int64_t before, int64_t after, int32_t limit) {
-    return after <= before || after <= (int64_t)taper_max_i32(limit, 0) * 1000;
+/** Whether a current with this square fits beside `other_uA`. */
+static bool fits(int64_t other_uA, int64_t square, int32_t limit_mA) {
+    const int64_t left_uA = (int64_t)taper_max_i32(limit_mA, 0) * 1000 - other_uA;
+    const int64_t left_mA = left_uA < 0 ? -1 : taper_quotient(left_uA, 1000);
+    return left_mA >= 0 && square <= left_mA * left_mA;
+}
+
+/* What is above a limit may be no more than it was before: only then the currents themselves are worked out. */
+
+static bool line_passes(const load_t *before, const load_t *after, unsigned line, int32_t limit_mA) {
+    const int64_t square = line_square(after, line);
+    return fits(after->line_uA[line], square, limit_mA) ||
+           after->line_uA[line] + 1000 * root(square) <=
+               before->line_uA[line] + 1000 * root(line_square(before, line));
+}
+
+static bool delta_passes(const load_t *before, const load_t *after, unsigned line, int32_t limit_mA) {
+    const int64_t windings = delta_windings_uA(after, line);
+    const int64_t square = delta_square(after, line);
+    return fits(windings, square, limit_mA) ||
+           windings + 1000 * root(square) <=
+               delta_windings_uA(before, line) + 1000 * root(delta_square(before, line));
 }
 
 static bool lines_pass(const taper_group_config_t *group, const int32_t *supply_mA, const load_t *before,
                        const load_t *after) {
     for (unsigned line = 0; line < LINES; line++) {
         const int32_t limit_mA = taper_min_i32(group->limit_mA, supply_mA[line]);
-        if (group->limit_mA != 0 && !may_be(line_uA(before, line), line_uA(after, line), limit_mA)) {
+        if (group->limit_mA != 0 && !line_passes(before, after, line, limit_mA)) {
             return false;
         }
-        if (group->delta_mA != 0 && !may_be(delta_uA(before, line), delta_uA(after, line), group->delta_mA)) {
+        if (group->delta_mA != 0 && !delta_passes(before, after, line, group->delta_mA)) {
             return false;
         }
     }
     return true;
 }
 
+/** Whether the power `before` and `after`, in mW, may be: within the limit, or no more. */
+static bool power_passes(int64_t before, int64_t after, int32_t limit_W) {
+    return after <= (int64_t)taper_max_i32(limit_W, 0) * 1000 || after <= before;
+}
+
 static bool group_passes(const taper_group_config_t *group, const taper_supply_t *supply,
                          const load_t *before, const load_t *after) {
     const int32_t limit_W = taper_min_i32(group->limit_W, supply->site_W);
-    return (group->limit_W == 0 || may_be(before->power_mW, after->power_mW, limit_W)) &&
+    return (group->limit_W == 0 || power_passes(before->power_mW, after->power_mW, limit_W)) &&
            lines_pass(group, supply->phase_mA, before, after);
 }
 
@@ -162,20 +181,24 @@ bool taper_guard_hand_over_passes(const taper_ledger_t *ledger, const taper_stat
                                   const taper_snapshot_t *snapshot, const taper_supply_t *supply,
                                   const taper_setpoints_t *granted) {
     const taper_supply_t described = taper_supply_of_W(INT32_MAX);
-    int32_t current_mA[TAPER_MAX_CONNECTORS] = {0};
     load_t before[TAPER_MAX_GROUPS];
     load_t after[TAPER_MAX_GROUPS];
+    memset(before, 0, config->group_count * sizeof *before);
+    memset(after, 0, config->group_count * sizeof *after);
     for (uint8_t i = 0; i < config->connector_count; i++) {
-        current_mA[i] = taper_ledger_may_mA(ledger, i);
+        const uint8_t group = config->connectors[i].group;
+        const int32_t may_mA = taper_ledger_may_mA(ledger, i);
+        add_connector(config, &snapshot->demand[i], i, may_mA, &before[group]);
+        add_connector(config, &snapshot->demand[i], i, taper_max_i32(granted->current_mA[i], may_mA),
+                      &after[group]);
     }
-    add_up(config, snapshot, current_mA, before);
-    for (uint8_t i = 0; i < config->connector_count; i++) {
-        current_mA[i] = taper_max_i32(granted->current_mA[i], current_mA[i]);
-    }
-    add_up(config, snapshot, current_mA, after);
-    for (uint8_t k = 0; k < config->group_count; k++) {
+    for (uint8_t k = config->group_count; k-- > 0;) { /* children stand behind their parents */
         if (!group_passes(&config->groups[k], k == 0 ? supply : &described, &before[k], &after[k])) {
             return false;
+        }
+        if (k > 0) {
+            add_load(&before[config->groups[k].parent], &before[k]);
+            add_load(&after[config->groups[k].parent], &after[k]);
         }
     }
     return true;
@@ -196,5 +219,5 @@ bool taper_guard_fallback_passes(const taper_ledger_t *ledger, const taper_stati
         before_mW += (int64_t)W_per_A * before_mA;
         after_mW += (int64_t)W_per_A * taper_max_i32(told_mA, before_mA);
     }
-    return may_be(before_mW, after_mW, failsafe_W);
+    return power_passes(before_mW, after_mW, failsafe_W);
 }

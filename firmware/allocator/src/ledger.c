@@ -46,6 +46,20 @@ bool taper_ledger_can_send(const taper_ledger_t *ledger, uint8_t connector, uint
     return !has_bit(ledger->entry[connector].echoed, counter);
 }
 
+/** After `open` has changed. */
+static void note_open(taper_ledger_entry_t *entry) {
+    int32_t most_dA = 0;
+    int32_t most_fallback_dA = 0;
+    for (unsigned c = 0; (unsigned)entry->open >> c != 0; c++) {
+        if (has_bit(entry->open, c)) {
+            most_dA = taper_max_i32(most_dA, entry->sent_dA[c]);
+            most_fallback_dA = taper_max_i32(most_fallback_dA, entry->fallback_dA[c]);
+        }
+    }
+    entry->open_mA = most_dA * TAPER_CURRENT_STEP_mA;
+    entry->open_fallback_mA = most_fallback_dA * TAPER_CURRENT_STEP_mA;
+}
+
 void taper_ledger_sent(taper_ledger_t *ledger, uint8_t connector, uint8_t counter, int32_t current_mA,
                        int32_t fallback_mA, uint32_t now_ms) {
     taper_ledger_entry_t *entry = &ledger->entry[connector];
@@ -56,22 +70,12 @@ void taper_ledger_sent(taper_ledger_t *ledger, uint8_t connector, uint8_t counte
     entry->last_fallback_mA = fallback_mA;
     set_bit(&entry->open, counter);
     set_bit(&entry->echoed, counter);
-}
-
-/** The greatest of those in steps of the wire that are open. */
-static int32_t most_open_mA(const taper_ledger_entry_t *entry, const uint16_t *steps_dA) {
-    int32_t most_dA = 0;
-    for (unsigned c = 0; c < TAPER_LEDGER_SETPOINTS; c++) {
-        if (has_bit(entry->open, c)) {
-            most_dA = taper_max_i32(most_dA, steps_dA[c]);
-        }
-    }
-    return most_dA * TAPER_CURRENT_STEP_mA;
+    note_open(entry);
 }
 
 /** What the connector may let through by our setpoints. One in force is never below its own fallback current. */
 static int32_t in_force_mA(const taper_ledger_entry_t *entry) {
-    return taper_max_i32(most_open_mA(entry, entry->sent_dA), entry->over_fallback_mA);
+    return taper_max_i32(entry->open_mA, entry->over_fallback_mA);
 }
 
 static unsigned count_fades(const taper_ledger_entry_t *entry) {
@@ -132,6 +136,7 @@ static void close_unheard(taper_ledger_entry_t *entry, unsigned c) {
     clear_bit(&entry->open, c);
     entry->over_fallback_mA =
         taper_max_i32(entry->over_fallback_mA, entry->fallback_dA[c] * TAPER_CURRENT_STEP_mA);
+    note_open(entry);
 }
 
 /** The connector fell back, so all that had arrived when it said so is over. */
@@ -164,12 +169,13 @@ static void hear_echo(taper_ledger_entry_t *entry, unsigned counter, uint32_t fo
     end_unknown(entry, followed_ms);
     entry->accepts = true;
     entry->over_fallback_mA = 0; /* what is open is younger than what ran out */
-    for (unsigned c = 0; c < TAPER_LEDGER_SETPOINTS; c++) {
+    for (unsigned c = 0; (unsigned)entry->echoed >> c != 0; c++) {
         if (c != counter && has_bit(entry->echoed, c) && sent_before(entry, c, counter)) {
             clear_bit(&entry->open, c);
             clear_bit(&entry->echoed, c);
         }
     }
+    note_open(entry);
 }
 
 /** Fault 41. A report without a current tells nothing. */
@@ -210,12 +216,15 @@ void taper_ledger_hear(taper_ledger_t *ledger, uint8_t connector, const taper_ev
 
 /** Setpoints expire. A report that names one may be on its way for a while more. */
 static void close_expired(const taper_ledger_t *ledger, taper_ledger_entry_t *entry, uint32_t now_ms) {
-    for (unsigned c = 0; c < TAPER_LEDGER_SETPOINTS; c++) {
+    for (unsigned c = 0; (unsigned)entry->echoed >> c != 0; c++) {
+        if (!has_bit(entry->echoed, c)) { /* nor is it open */
+            continue;
+        }
         const uint32_t end_ms = entry->sent_ms[c] + ledger->validity_ms + TAPER_LEDGER_LATE_ms;
         if (has_bit(entry->open, c) && taper_time_reached(now_ms, end_ms)) {
             close_unheard(entry, c);
         }
-        if (has_bit(entry->echoed, c) && taper_time_reached(now_ms, end_ms + TAPER_LEDGER_LATE_ms)) {
+        if (taper_time_reached(now_ms, end_ms + TAPER_LEDGER_LATE_ms)) {
             clear_bit(&entry->echoed, c);
         }
     }
@@ -266,7 +275,7 @@ int32_t taper_ledger_may_mA(const taper_ledger_t *ledger, uint8_t connector) {
 
 int32_t taper_ledger_fallback_mA(const taper_ledger_t *ledger, uint8_t connector) {
     const taper_ledger_entry_t *entry = &ledger->entry[connector];
-    return taper_max_i32(most_open_mA(entry, entry->fallback_dA), entry->over_fallback_mA);
+    return taper_max_i32(entry->open_fallback_mA, entry->over_fallback_mA);
 }
 
 int32_t taper_ledger_unreached_mA(const taper_ledger_t *ledger, uint8_t connector) {

@@ -35,7 +35,7 @@ static bool waits(const taper_station_config_t *config, uint8_t i, int32_t sent_
 
 /** Whole ramp of `time_ms`. */
 static int32_t gained_mA(const taper_station_config_t *config, uint32_t time_ms) {
-    return taper_saturate_i32((int64_t)time_ms * config->ramp_mA_per_s / 1000);
+    return taper_saturate_i32(taper_quotient((int64_t)time_ms * config->ramp_mA_per_s, 1000));
 }
 
 /** What the ramp adds in `elapsed_ms`. Longer rests count no more, but always for one step of the wire. */

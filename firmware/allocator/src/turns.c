@@ -18,28 +18,32 @@ static int64_t at_most(int64_t value, int64_t most) {
 }
 
 /** What the battery takes at its present charge [W]; the model of taper/battery.h. */
-static int64_t battery_takes_W(const taper_demand_t *demand) {
+static int32_t battery_takes_W(const taper_demand_t *demand) {
     if (demand->capacity_Wh <= 0) {
         return demand->peak_W;
     }
-    const int64_t fall_W = (int64_t)demand->taper_W * demand->stored_Wh / demand->capacity_Wh;
-    return demand->peak_W - at_most(fall_W, demand->peak_W);
+    const int64_t fall_W = taper_quotient((int64_t)demand->taper_W * demand->stored_Wh, demand->capacity_Wh);
+    return demand->peak_W - (int32_t)at_most(fall_W, demand->peak_W);
 }
 
 /** What the vehicle draws at most until the next tick, whatever it is offered [mW]. */
 static int64_t draws_mW(const taper_station_config_t *config, const taper_demand_t *demand) {
-    const int64_t completing_W =
-        ((int64_t)demand->need_Wh * 3600 * 1000 + config->tick_ms - 1) / config->tick_ms;
-    return at_most(battery_takes_W(demand), completing_W) * 1000;
+    const int64_t takes_W = battery_takes_W(demand);
+    const int64_t need_mWs = (int64_t)demand->need_Wh * 3600 * 1000;
+    if (takes_W * config->tick_ms <= need_mWs) {
+        return takes_W * 1000; /* it is not complete by then */
+    }
+    return (need_mWs + config->tick_ms - 1) / config->tick_ms * 1000;
 }
 
 /** Time to departure less the time to charge; who cannot charge is helped least by a place [s]. */
 static int32_t laxity_s(const taper_demand_t *demand) {
-    const int64_t power_W = at_most(taper_demand_allowed_W(demand), battery_takes_W(demand));
+    const int32_t power_W = taper_min_i32(taper_demand_allowed_W(demand), battery_takes_W(demand));
     if (power_W <= 0) {
         return INT32_MAX;
     }
-    return taper_saturate_i32(demand->departs_in_s - (int64_t)demand->need_Wh * 3600 / power_W);
+    return taper_saturate_i32(demand->departs_in_s -
+                              taper_quotient((int64_t)demand->need_Wh * 3600, power_W));
 }
 
 /* ---- Owed energy: a wish below the minimum, followed over time */

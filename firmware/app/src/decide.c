@@ -127,8 +127,8 @@ static void allocate(taper_station_t *station, uint32_t now_ms) {
         station->setpoint_session[i] = taper_session_number(&station->sessions, i);
     }
     taper_record_resume_turns(station, now_ms);
-    taper_allocate(&station->allocator, config, &station->snapshot, &station->proposal,
-                   &station->limit_now.supply, reserved_mA, &station->target);
+    taper_allocate(&station->allocator, config, &station->snapshot, &station->proposal, &station->rows,
+                   reserved_mA, &station->target);
     if (station->rival_heard || station->stopped) {
         memset(&station->target, 0, sizeof station->target);
     }
@@ -185,8 +185,8 @@ static void enforce(taper_station_t *station, taper_setpoints_t *granted) {
 static void grant_fallback(taper_station_t *station) {
     const taper_station_config_t *config = station->options.config;
     const int32_t failsafe_W = station->limits.failsafe_W;
-    taper_ledger_grant_fallback(&station->ledger, config, &station->snapshot, station->proposal.rank,
-                                failsafe_W, &station->setpoints, &station->fallback);
+    taper_ledger_grant_fallback(&station->ledger, config, &station->snapshot, &station->rows,
+                                station->proposal.rank, failsafe_W, &station->setpoints, &station->fallback);
     if (!taper_guard_fallback_passes(&station->ledger, config, &station->snapshot, failsafe_W,
                                      &station->setpoints, &station->fallback)) {
         taper_station_count(station, TAPER_COUNTER_GUARD_VIOLATIONS);
@@ -201,8 +201,8 @@ static void grant(taper_station_t *station, uint32_t now_ms) {
     taper_setpoints_t granted = {{0}}; /* all of it: it is compared whole */
     taper_shape_bound(&station->shape, config, &station->snapshot, &station->target,
                       taper_station_world_ms(station, now_ms), &station->shaped);
-    taper_ledger_grant(&station->ledger, config, &station->snapshot, station->proposal.rank,
-                       &station->limit_now.supply, &station->shaped, &granted);
+    taper_ledger_grant(&station->ledger, config, &station->snapshot, station->proposal.rank, &station->rows,
+                       &station->shaped, &granted);
     enforce(station, &granted);
     station->setpoints = granted;
     grant_fallback(station);
@@ -241,6 +241,7 @@ void taper_station_decide(taper_station_t *station, uint32_t now_ms) {
     if (mode == TAPER_MODE_INIT) {
         station->limit_now.supply.site_W = 0;
     }
+    taper_rows_now(&station->rows, station->options.config, &station->snapshot, &station->limit_now.supply);
     propose(station, mode);
     allocate(station, now_ms);
     grant(station, now_ms);

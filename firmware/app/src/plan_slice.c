@@ -83,16 +83,19 @@ void taper_station_plan(taper_station_t *station, int32_t site_limit_W) {
         return;
     }
     const uint32_t began_us = clock_us(station);
-    if (station->planner.verdict != TAPER_VERDICT_SOLVING) {
+    const bool begins = station->planner.verdict != TAPER_VERDICT_SOLVING;
+    const uint16_t iterations = station->options.iterations_per_tick;
+    if (begins) {
         if (!plan_is_due(station, site_limit_W)) {
             return;
         }
         start_plan(station, site_limit_W);
     }
-    const taper_verdict_t verdict =
-        taper_planner_run(&station->planner, station->options.iterations_per_tick);
+    if (!begins || iterations >= TAPER_MIN_SLICE) { /* where slices are short, to state a problem is one */
+        taper_planner_run(&station->planner, iterations);
+    }
     station->solve_us += clock_us(station) - began_us;
-    if (verdict != TAPER_VERDICT_SOLVING) {
+    if (station->planner.verdict != TAPER_VERDICT_SOLVING) {
         keep_plan(station);
     }
 }

@@ -6,12 +6,10 @@
 
 static void add_connector(taper_station_t *station, uint8_t i) {
     const taper_station_config_t *config = station->options.config;
-    const taper_booking_t booking = taper_booking_now(config, &station->snapshot, i);
-    for (int kind = 0; kind < TAPER_ROW_KINDS; kind++) {
-        const int64_t share =
-            (int64_t)station->target.current_mA[i] * taper_row_weight(&booking, (taper_row_kind_t)kind);
-        for (uint8_t k = config->connectors[i].group; k != TAPER_NO_GROUP; k = config->groups[k].parent) {
-            station->row_sum[k][kind] += share;
+    const taper_rows_t *rows = &station->rows;
+    for (uint8_t k = config->connectors[i].group; k != TAPER_NO_GROUP; k = config->groups[k].parent) {
+        for (unsigned row = 0; row < rows->count; row++) {
+            station->row_sum[k][row] += (int64_t)station->target.current_mA[i] * rows->weight[i][row];
         }
     }
 }
@@ -26,13 +24,12 @@ void taper_station_sum_rows(taper_station_t *station) {
 }
 
 /** Whether a row leaves less than a step of the wire for a connector. */
-static bool is_full(const taper_station_t *station, uint8_t k, taper_row_kind_t kind,
-                    const taper_booking_t *booking) {
-    const int32_t limit = taper_row_limit_now(station->options.config, &station->limit_now.supply, k, kind);
-    const int32_t weight = taper_row_weight(booking, kind);
-    const int64_t sum = station->row_sum[k][kind];
+static bool is_full(const taper_station_t *station, uint8_t k, unsigned row, uint8_t i) {
+    const int32_t limit = station->rows.limit[k][row];
+    const int32_t weight = station->rows.weight[i][row];
+    const int64_t sum = station->row_sum[k][row];
     const int64_t step = (int64_t)TAPER_CURRENT_STEP_mA * weight;
-    const int64_t load = kind < TAPER_ROW_SUMS || weight > 0 ? sum + step : -(sum + step);
+    const int64_t load = row < station->rows.sums || weight > 0 ? sum + step : -(sum + step);
     return limit != TAPER_NO_LIMIT && weight != 0 && load > (int64_t)limit * 1000;
 }
 
@@ -53,16 +50,15 @@ static taper_reason_t name_of(const taper_station_t *station, uint8_t k, taper_r
 
 taper_reason_t taper_station_binding_limit(const taper_station_t *station, uint8_t i) {
     const taper_station_config_t *config = station->options.config;
-    const taper_booking_t booking = taper_booking_now(config, &station->snapshot, i);
     if (station->limit_now.supply.site_W <= 0) {
         return station->limit_now.source == TAPER_LIMIT_FAILSAFE ? TAPER_REASON_FAILSAFE_LIMIT
                                                                  : TAPER_REASON_GRID_PAUSE;
     }
     taper_reason_t found = TAPER_REASON_PLANNED;
     for (uint8_t k = config->connectors[i].group; k != TAPER_NO_GROUP; k = config->groups[k].parent) {
-        for (int kind = TAPER_ROW_KINDS; kind-- > 0;) { /* the site's power last: it is told first */
-            if (is_full(station, k, (taper_row_kind_t)kind, &booking)) {
-                found = name_of(station, k, (taper_row_kind_t)kind);
+        for (unsigned row = station->rows.count; row-- > 0;) { /* the site's power last: it is told first */
+            if (is_full(station, k, row, i)) {
+                found = name_of(station, k, (taper_row_kind_t)station->rows.kind[row]);
             }
         }
     }

@@ -133,7 +133,7 @@ static taper_ctrl_status_t status_of(const taper_station_t *station) {
         .mode = (uint8_t)station->supervisor.mode,
         .verdict = (uint8_t)station->planner.verdict,
         .limit_source = (uint8_t)station->limit_now.source,
-        .solve_ticks = station->planner.slices,
+        .solve_ticks = (uint8_t)taper_min_i32(station->planner.slices, UINT8_MAX),
         .iterations = taper_planner_iterations(&station->planner),
         .plan_version = (uint8_t)taper_station_counter(station, TAPER_COUNTER_PLANS),
     };

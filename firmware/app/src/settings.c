@@ -142,7 +142,7 @@ static void set_all(const taper_settings_t *settings, taper_site_t *site) {
 static bool are_in_range(const taper_settings_t *settings, const taper_station_config_t *built) {
     return lowers(settings->limit_W, built->groups[0].limit_W) &&
            lowers(settings->failsafe_W, built->failsafe_W) && settings->proposer <= TAPER_PROPOSER_LLF &&
-           (settings->iterations_per_tick == 0 || settings->iterations_per_tick >= TAPER_MIN_SLICE);
+           settings->iterations_per_tick <= TAPER_MAX_ITERATIONS;
 }
 
 taper_status_t taper_settings_apply(const taper_settings_t *settings, const taper_station_config_t *built,

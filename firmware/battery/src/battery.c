@@ -10,7 +10,7 @@ int32_t taper_battery_limit_W(const taper_demand_t *demand) {
     if (demand->capacity_Wh <= 0) {
         return demand->peak_W;
     }
-    const int64_t fall_W = (int64_t)demand->taper_W * demand->stored_Wh / demand->capacity_Wh;
+    const int64_t fall_W = taper_quotient((int64_t)demand->taper_W * demand->stored_Wh, demand->capacity_Wh);
     return taper_saturate_i32(fall_W >= demand->peak_W ? 0 : demand->peak_W - fall_W);
 }
 

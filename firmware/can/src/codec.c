@@ -5,6 +5,8 @@
 #include "codec_internal.h"
 #include "taper/types.h"
 
+#define KINDS 32u
+
 /* Which nodes a function may carry in its identifier. */
 typedef enum {
     NODE_CONNECTOR,
@@ -14,30 +16,30 @@ typedef enum {
 } node_class_t;
 
 typedef struct {
-    taper_message_kind_t kind;
     node_class_t node;
     void (*decode)(const uint8_t *data, taper_message_t *message, taper_decoding_t *decoding);
     bool (*encode)(const taper_message_t *message, uint8_t *data);
 } route_t;
 
-static const route_t routes[] = {
-    {TAPER_MESSAGE_EMCY, NODE_ANY, taper_decode_emcy, taper_encode_emcy},
-    {TAPER_MESSAGE_SITE_LIMIT, NODE_GATEWAY, taper_decode_site_limit, taper_encode_site_limit},
-    {TAPER_MESSAGE_SETPOINT, NODE_CONNECTOR, taper_decode_setpoint, taper_encode_setpoint},
-    {TAPER_MESSAGE_EVSE_STATUS, NODE_CONNECTOR, taper_decode_evse_status, taper_encode_evse_status},
-    {TAPER_MESSAGE_EV_STATUS, NODE_CONNECTOR, taper_decode_ev_status, taper_encode_ev_status},
-    {TAPER_MESSAGE_EVSE_ELEC, NODE_CONNECTOR, taper_decode_evse_elec, taper_encode_evse_elec},
-    {TAPER_MESSAGE_SITE_METER, NODE_GATEWAY, taper_decode_site_meter, taper_encode_site_meter},
-    {TAPER_MESSAGE_TIME_SYNC, NODE_GATEWAY, taper_decode_time_sync, taper_encode_time_sync},
-    {TAPER_MESSAGE_CTRL_STATUS, NODE_CONTROLLER, taper_decode_ctrl_status, taper_encode_ctrl_status},
-    {TAPER_MESSAGE_EV_PARAM_A, NODE_CONNECTOR, taper_decode_ev_param_a, taper_encode_ev_param_a},
-    {TAPER_MESSAGE_EV_PARAM_B, NODE_CONNECTOR, taper_decode_ev_param_b, taper_encode_ev_param_b},
-    {TAPER_MESSAGE_EV_PARAM_C, NODE_CONNECTOR, taper_decode_ev_param_c, taper_encode_ev_param_c},
-    {TAPER_MESSAGE_EVSE_INFO, NODE_CONNECTOR, taper_decode_evse_info, taper_encode_evse_info},
-    {TAPER_MESSAGE_PLAN, NODE_CONNECTOR, taper_decode_plan, taper_encode_plan},
-    {TAPER_MESSAGE_OUTLOOK, NODE_CONNECTOR, taper_decode_outlook, taper_encode_outlook},
-    {TAPER_MESSAGE_CTRL_DIAG, NODE_CONTROLLER, taper_decode_ctrl_diag, taper_encode_ctrl_diag},
-    {TAPER_MESSAGE_EV_PARAM_D, NODE_CONNECTOR, taper_decode_ev_param_d, taper_encode_ev_param_d},
+/** By kind, which is the five bits of the function in an identifier; those that are not decoded here are empty. */
+static const route_t routes[KINDS] = {
+    [TAPER_MESSAGE_EMCY] = {NODE_ANY, taper_decode_emcy, taper_encode_emcy},
+    [TAPER_MESSAGE_SITE_LIMIT] = {NODE_GATEWAY, taper_decode_site_limit, taper_encode_site_limit},
+    [TAPER_MESSAGE_SETPOINT] = {NODE_CONNECTOR, taper_decode_setpoint, taper_encode_setpoint},
+    [TAPER_MESSAGE_EVSE_STATUS] = {NODE_CONNECTOR, taper_decode_evse_status, taper_encode_evse_status},
+    [TAPER_MESSAGE_EV_STATUS] = {NODE_CONNECTOR, taper_decode_ev_status, taper_encode_ev_status},
+    [TAPER_MESSAGE_EVSE_ELEC] = {NODE_CONNECTOR, taper_decode_evse_elec, taper_encode_evse_elec},
+    [TAPER_MESSAGE_SITE_METER] = {NODE_GATEWAY, taper_decode_site_meter, taper_encode_site_meter},
+    [TAPER_MESSAGE_TIME_SYNC] = {NODE_GATEWAY, taper_decode_time_sync, taper_encode_time_sync},
+    [TAPER_MESSAGE_CTRL_STATUS] = {NODE_CONTROLLER, taper_decode_ctrl_status, taper_encode_ctrl_status},
+    [TAPER_MESSAGE_EV_PARAM_A] = {NODE_CONNECTOR, taper_decode_ev_param_a, taper_encode_ev_param_a},
+    [TAPER_MESSAGE_EV_PARAM_B] = {NODE_CONNECTOR, taper_decode_ev_param_b, taper_encode_ev_param_b},
+    [TAPER_MESSAGE_EV_PARAM_C] = {NODE_CONNECTOR, taper_decode_ev_param_c, taper_encode_ev_param_c},
+    [TAPER_MESSAGE_EVSE_INFO] = {NODE_CONNECTOR, taper_decode_evse_info, taper_encode_evse_info},
+    [TAPER_MESSAGE_PLAN] = {NODE_CONNECTOR, taper_decode_plan, taper_encode_plan},
+    [TAPER_MESSAGE_OUTLOOK] = {NODE_CONNECTOR, taper_decode_outlook, taper_encode_outlook},
+    [TAPER_MESSAGE_CTRL_DIAG] = {NODE_CONTROLLER, taper_decode_ctrl_diag, taper_encode_ctrl_diag},
+    [TAPER_MESSAGE_EV_PARAM_D] = {NODE_CONNECTOR, taper_decode_ev_param_d, taper_encode_ev_param_d},
 };
 
 static bool node_allowed(node_class_t node_class, unsigned node) {
@@ -52,22 +54,19 @@ static bool node_allowed(node_class_t node_class, unsigned node) {
 
 /* NULL for a kind that is not decoded here, or a node that it does not allow. */
 static const route_t *find_route(unsigned kind, unsigned node) {
-    for (size_t i = 0; i < sizeof routes / sizeof routes[0]; i++) {
-        if ((unsigned)routes[i].kind == kind) {
-            return node_allowed(routes[i].node, node) ? &routes[i] : NULL;
-        }
-    }
-    return NULL;
+    const route_t *route = kind < KINDS ? &routes[kind] : NULL;
+    return route != NULL && route->decode != NULL && node_allowed(route->node, node) ? route : NULL;
 }
 
 bool taper_decode(const taper_frame_t *frame, taper_message_t *message, bool *bad_field) {
     const unsigned node = frame->id & 0x3Fu;
-    const route_t *route = find_route((unsigned)frame->id >> 6, node);
+    const unsigned kind = (unsigned)frame->id >> 6;
+    const route_t *route = find_route(kind, node);
     if (route == NULL || frame->length != TAPER_FRAME_LENGTH) {
         return false;
     }
     memset(message, 0, sizeof *message);
-    message->kind = route->kind;
+    message->kind = (taper_message_kind_t)kind;
     message->bus = frame->bus;
     message->node = (uint8_t)node;
 

@@ -132,7 +132,7 @@ static bool step(taper_driven_t *driven, uint32_t now_ms) {
     const uint32_t started_ms = planner->started_ms;
     const uint16_t before = planner->iterations;
     const bool works = planner->verdict == TAPER_VERDICT_SOLVING;
-    const uint8_t slices = planner->slices;
+    const uint16_t slices = planner->slices;
     taper_station_step(driven->station, now_ms);
     const bool is_new = planner->started_ms != started_ms;
     driven->slice_iterations = (uint16_t)(planner->iterations - (is_new ? 0 : before));

@@ -73,7 +73,11 @@ taper_status_t taper_planner_init(taper_planner_t *planner, const taper_solver_t
     memset(planner, 0, sizeof *planner);
     planner->solver = solver;
     taper_horizon_shape(&planner->horizon, config);
-    if (!solver_fits(solver, &planner->horizon) || !load_matrices(planner)) {
+    if (!solver_fits(solver, &planner->horizon)) {
+        return TAPER_ERR_CONFIG;
+    }
+    (void)osqp_update_rho(solver->osqp, LEAST_RHO); /* a fresh solver has nothing to factorise yet */
+    if (!load_matrices(planner)) {
         return TAPER_ERR_CONFIG;
     }
     solver->osqp->settings->eps_abs = ABSOLUTE_TOLERANCE;
@@ -224,7 +228,7 @@ taper_verdict_t taper_planner_run(taper_planner_t *planner, uint16_t iterations)
             break; /* a factorisation never shares a short slice */
         }
     }
-    planner->slices = (uint8_t)(planner->slices + (planner->slices < UINT8_MAX ? 1 : 0));
+    planner->slices++; /* a problem takes less than twice TAPER_MAX_ITERATIONS */
     if (taper_planner_is_usable(planner->verdict)) {
         taper_project(&planner->horizon, planner->solver->osqp->solution->x);
     }

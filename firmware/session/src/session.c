@@ -277,7 +277,7 @@ uint32_t taper_session_unix_s(const taper_session_table_t *table, uint32_t now_m
     }
     const uint64_t world_ms =
         (uint64_t)taper_elapsed_ms(now_ms, table->clock_heard.at_ms) * table->time_scale;
-    return table->unix_s + (uint32_t)(world_ms / 1000u);
+    return table->unix_s + (uint32_t)taper_quotient((int64_t)world_ms, 1000);
 }
 
 /* Control runs on the monotonic clock, so a jump of the wall clock moves nothing but the departures told by it. */
@@ -339,8 +339,7 @@ bool taper_session_apply(taper_session_table_t *table, const taper_message_t *me
 
 /* A vehicle that starts or stops to want energy is an event for the planner, whatever the cause. */
 static void note_activity(taper_session_table_t *table, uint8_t connector, uint32_t now_ms) {
-    taper_demand_t demand;
-    const bool active = taper_session_demand(table, connector, now_ms, &demand);
+    const bool active = taper_session_idle_reason(table, connector, now_ms) == TAPER_REASON_PLANNED;
     if (active != table->session[connector].wants_energy) {
         table->session[connector].wants_energy = active;
         table->revision++;

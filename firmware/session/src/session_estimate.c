@@ -3,7 +3,7 @@
 
 /* `soc_permille` of `capacity_Wh`, in Wh. */
 static int32_t energy_at(int32_t soc_permille, int32_t capacity_Wh) {
-    return (int32_t)((int64_t)soc_permille * capacity_Wh / 1000);
+    return (int32_t)taper_quotient((int64_t)soc_permille * capacity_Wh, 1000);
 }
 
 int32_t taper_session_capacity_Wh(const taper_session_t *session) {
@@ -74,7 +74,8 @@ static bool jump_is_believed(taper_session_t *session) {
    @return whether this report is the first of a jump. */
 static bool correct_by_soc(taper_session_t *session, int32_t capacity_Wh) {
     const int32_t reported_Wh = energy_at(session->ev.soc_permille, capacity_Wh);
-    const int32_t quantum_Wh = (int32_t)((int64_t)capacity_Wh * TAPER_SOC_QUANTUM_tenth_permille / 10000);
+    const int32_t quantum_Wh =
+        (int32_t)taper_quotient((int64_t)capacity_Wh * TAPER_SOC_QUANTUM_tenth_permille, 10000);
     const int32_t low_Wh = reported_Wh - quantum_Wh;
     const int32_t high_Wh = reported_Wh + quantum_Wh + energy_since_report_Wh(session);
     const int32_t jump_Wh = energy_at(TAPER_SOC_JUMP_permille, capacity_Wh);

@@ -49,8 +49,4 @@ bool taper_session_soc_is_fresh(const taper_session_t *session, uint32_t now_ms)
  */
 bool taper_session_estimate(taper_session_t *session, uint32_t now_ms);
 
-/** Fill in `demand`; all zero unless active. @return `demand->active`. */
-bool taper_session_demand(const taper_session_table_t *table, uint8_t connector, uint32_t now_ms,
-                          taper_demand_t *demand);
-
 #endif

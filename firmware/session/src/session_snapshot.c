@@ -196,36 +196,6 @@ static void fill_battery(taper_demand_t *demand, const taper_session_t *session,
     }
 }
 
-bool taper_session_demand(const taper_session_table_t *table, uint8_t connector, uint32_t now_ms,
-                          taper_demand_t *demand) {
-    const taper_connector_config_t *config = &table->config->connectors[connector];
-    const taper_session_t *session = &table->session[connector];
-    memset(demand, 0, sizeof *demand);
-    demand->booking =
-        taper_session_booking(table, connector, now_ms, config->phases); /* whatever its phases do by now */
-    if (obstacle(table, connector, now_ms) != TAPER_REASON_PLANNED) {
-        return false;
-    }
-    const int32_t wanted_Wh = need_Wh(session);
-    const int32_t max_mA = max_current_mA(config, session, now_ms);
-    const int32_t min_mA = min_current_mA(config, session);
-    const int32_t voltage_V = volts(config, session, now_ms);
-    if (wanted_Wh <= 0 || max_mA <= 0 || min_mA > max_mA) {
-        return false;
-    }
-    demand->active = true;
-    demand->session = session->used.a.session;
-    demand->need_Wh = wanted_Wh;
-    demand->max_mA = max_mA;
-    demand->min_mA = min_mA;
-    demand->W_per_A = voltage_V * phases_in_use(config, session);
-    demand->conductors = phases_in_use(config, session);
-    demand->booking = taper_session_booking(table, connector, now_ms, demand->conductors);
-    demand->departs_in_s = departs_in_s(table, session, now_ms);
-    fill_battery(demand, session, now_ms);
-    return true;
-}
-
 taper_reason_t taper_session_idle_reason(const taper_session_table_t *table, uint8_t connector,
                                          uint32_t now_ms) {
     const taper_reason_t reason = obstacle(table, connector, now_ms);
@@ -242,10 +212,33 @@ taper_reason_t taper_session_idle_reason(const taper_session_table_t *table, uin
     return fits ? TAPER_REASON_PLANNED : TAPER_REASON_VEHICLE_LIMIT;
 }
 
+/** Fill in `demand`; all zero, but for its booking, unless active. */
+static void fill_demand(const taper_session_table_t *table, uint8_t connector, uint32_t now_ms,
+                        taper_demand_t *demand) {
+    const taper_connector_config_t *config = &table->config->connectors[connector];
+    const taper_session_t *session = &table->session[connector];
+    memset(demand, 0, sizeof *demand);
+    if (taper_session_idle_reason(table, connector, now_ms) != TAPER_REASON_PLANNED) {
+        demand->booking = taper_session_booking(table, connector, now_ms,
+                                                config->phases); /* whatever its phases do by now */
+        return;
+    }
+    demand->active = true;
+    demand->session = session->used.a.session;
+    demand->need_Wh = need_Wh(session);
+    demand->max_mA = max_current_mA(config, session, now_ms);
+    demand->min_mA = min_current_mA(config, session);
+    demand->conductors = phases_in_use(config, session);
+    demand->W_per_A = volts(config, session, now_ms) * demand->conductors;
+    demand->booking = taper_session_booking(table, connector, now_ms, demand->conductors);
+    demand->departs_in_s = departs_in_s(table, session, now_ms);
+    fill_battery(demand, session, now_ms);
+}
+
 void taper_session_snapshot(const taper_session_table_t *table, uint32_t now_ms, taper_snapshot_t *snapshot) {
     snapshot->now_ms = now_ms * table->time_scale;
     snapshot->count = table->config->connector_count;
     for (uint8_t i = 0; i < snapshot->count; i++) {
-        (void)taper_session_demand(table, i, now_ms, &snapshot->demand[i]);
+        fill_demand(table, i, now_ms, &snapshot->demand[i]);
     }
 }

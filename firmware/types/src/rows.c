@@ -27,25 +27,33 @@ static place_t place_of(taper_row_kind_t kind) {
         .family = at < 6u ? FAMILY_LINE : FAMILY_DELTA, .line = (uint8_t)(at % 3u), .second = at % 6u >= 3u};
 }
 
-int32_t taper_row_limit(const taper_station_config_t *config, uint8_t group, taper_row_kind_t kind) {
-    const taper_group_config_t *limits = &config->groups[group];
-    const int32_t by_family[] = {[FAMILY_POWER] = limits->limit_W,
-                                 [FAMILY_LINE] = limits->limit_mA,
-                                 [FAMILY_DELTA] = limits->delta_mA,
-                                 [FAMILY_DIFFERENCE] = limits->imbalance_mA};
-    const place_t place = place_of(kind);
-    const int32_t limit = by_family[place.family];
+static int32_t limit_of(const taper_group_config_t *group, family_t family) {
+    switch (family) {
+    case FAMILY_POWER: return group->limit_W;
+    case FAMILY_LINE: return group->limit_mA;
+    case FAMILY_DELTA: return group->delta_mA;
+    case FAMILY_DIFFERENCE:
+    default: return group->imbalance_mA;
+    }
+}
+
+static int32_t limit_at(const taper_station_config_t *config, uint8_t k, place_t place) {
+    const int32_t limit = limit_of(&config->groups[k], place.family);
     if (limit == 0 || (place.second && !config->line_to_line)) {
         return TAPER_NO_LIMIT; /* none, or one that would say the same as the first */
     }
     return limit;
 }
 
-int32_t taper_row_limit_now(const taper_station_config_t *config, const taper_supply_t *supply, uint8_t group,
-                            taper_row_kind_t kind) {
-    const int32_t limit = taper_row_limit(config, group, kind);
-    const place_t place = place_of(kind);
-    if (limit == TAPER_NO_LIMIT || group != 0) {
+int32_t taper_row_limit(const taper_station_config_t *config, uint8_t group, taper_row_kind_t kind) {
+    return limit_at(config, group, place_of(kind));
+}
+
+/** The same with what the site may have now. */
+static int32_t limit_now_at(const taper_station_config_t *config, const taper_supply_t *supply, uint8_t k,
+                            place_t place) {
+    const int32_t limit = limit_at(config, k, place);
+    if (limit == TAPER_NO_LIMIT || k != 0) {
         return limit;
     }
     if (place.family == FAMILY_POWER) {
@@ -55,6 +63,11 @@ int32_t taper_row_limit_now(const taper_station_config_t *config, const taper_su
         return taper_max_i32(taper_min_i32(limit, supply->phase_mA[place.line]), 0);
     }
     return limit;
+}
+
+int32_t taper_row_limit_now(const taper_station_config_t *config, const taper_supply_t *supply, uint8_t group,
+                            taper_row_kind_t kind) {
+    return limit_now_at(config, supply, group, place_of(kind));
 }
 
 static bool has_phase(const taper_booking_t *booking, unsigned phase) {
@@ -106,14 +119,22 @@ static int32_t row_permille(const taper_booking_t *booking, place_t place) {
                                         : difference_permille(booking, place.line);
 }
 
-int32_t taper_row_weight(const taper_booking_t *booking, taper_row_kind_t kind) {
-    const place_t place = place_of(kind);
+static int32_t weight_at(const taper_booking_t *booking, place_t place) {
     if (place.family == FAMILY_POWER) {
         return booking->W_per_A;
     }
-    const int64_t thousandths = (int64_t)row_permille(booking, place) * booking->permille;
+    const int32_t share_permille = row_permille(booking, place);
+    if (share_permille % FULL_permille ==
+        0) { /* nearly always: none, or all of it; a division of 64 bits is slow */
+        return share_permille / FULL_permille * booking->permille;
+    }
+    const int64_t thousandths = (int64_t)share_permille * booking->permille;
     const int64_t part = thousandths % FULL_permille > 0 ? 1 : 0; /* rounded up */
     return (int32_t)(thousandths / FULL_permille + part);
+}
+
+int32_t taper_row_weight(const taper_booking_t *booking, taper_row_kind_t kind) {
+    return weight_at(booking, place_of(kind));
 }
 
 uint8_t taper_rotation_phases(taper_rotation_t rotation, uint8_t conductors) {
@@ -149,14 +170,21 @@ taper_booking_t taper_booking_nominal(const taper_station_config_t *config, uint
                              .line_to_line = connector->line_to_line};
 }
 
+/** Power of 1 A of a vehicle in the supply: with a converter's losses, rounded up. */
+static int32_t drawn_W_per_A(const taper_connector_config_t *connector, const taper_demand_t *demand) {
+    if (!connector->is_dc) {
+        return demand->W_per_A;
+    }
+    const int32_t efficiency = connector->efficiency_permille;
+    return (int32_t)(((int64_t)demand->W_per_A * FULL_permille + efficiency - 1) / efficiency);
+}
+
 /** Least power of 1 A that counts for connector `i`: what its demand draws, with losses; else by the description. */
 static int32_t least_W_per_A(const taper_station_config_t *config, const taper_snapshot_t *snapshot,
                              uint8_t i) {
     const taper_demand_t *demand = &snapshot->demand[i];
     if (demand->active) {
-        const int32_t efficiency =
-            config->connectors[i].is_dc ? config->connectors[i].efficiency_permille : FULL_permille;
-        return (int32_t)(((int64_t)demand->W_per_A * FULL_permille + efficiency - 1) / efficiency);
+        return drawn_W_per_A(&config->connectors[i], demand);
     }
     const bool is_told = demand->booking.phases != 0 && demand->booking.W_per_A != 0;
     return is_told ? demand->booking.W_per_A : taper_booking_nominal(config, i).W_per_A;
@@ -168,6 +196,44 @@ taper_booking_t taper_booking_now(const taper_station_config_t *config, const ta
     taper_booking_t booking = told->phases == 0 ? taper_booking_nominal(config, i) : *told;
     booking.W_per_A = taper_max_i32(told->W_per_A, least_W_per_A(config, snapshot, i));
     return booking;
+}
+
+/** List the limits of a kind in place `at`. @return whether some group has one. */
+static bool list_limits(taper_rows_t *rows, const taper_station_config_t *config,
+                        const taper_supply_t *supply, place_t place, unsigned at) {
+    bool limited = false;
+    for (uint8_t k = 0; k < config->group_count; k++) {
+        rows->limit[k][at] = limit_now_at(config, supply, k, place);
+        limited = limited || rows->limit[k][at] != TAPER_NO_LIMIT;
+    }
+    return limited;
+}
+
+static void list_kind(taper_rows_t *rows, const taper_station_config_t *config, const taper_supply_t *supply,
+                      taper_row_kind_t kind) {
+    const place_t place = place_of(kind);
+    const unsigned at = rows->count;
+    if (!list_limits(rows, config, supply, place, at)) {
+        return;
+    }
+    for (uint8_t i = 0; i < config->connector_count; i++) {
+        rows->weight[i][at] = weight_at(&rows->booking[i], place);
+    }
+    rows->kind[at] = (uint8_t)kind;
+    rows->count++;
+    rows->sums = kind < TAPER_ROW_SUMS ? rows->count : rows->sums;
+}
+
+void taper_rows_now(taper_rows_t *rows, const taper_station_config_t *config,
+                    const taper_snapshot_t *snapshot, const taper_supply_t *supply) {
+    for (uint8_t i = 0; i < config->connector_count; i++) {
+        rows->booking[i] = taper_booking_now(config, snapshot, i);
+    }
+    rows->count = 0;
+    rows->sums = 0;
+    for (int kind = 0; kind < TAPER_ROW_KINDS; kind++) {
+        list_kind(rows, config, supply, (taper_row_kind_t)kind);
+    }
 }
 
 bool taper_group_contains(const taper_station_config_t *config, uint8_t k, uint8_t i) {

@@ -85,6 +85,13 @@ taper_proposal_t scene_proposal(int32_t wish_W) {
     return proposal;
 }
 
+const taper_rows_t *scene_rows(const taper_station_config_t *station, const taper_snapshot_t *snapshot,
+                               const taper_supply_t *supply) {
+    static taper_rows_t rows;
+    taper_rows_now(&rows, station, snapshot, supply);
+    return &rows;
+}
+
 uint32_t scene_random(uint32_t *state) {
     *state ^= *state << 13;
     *state ^= *state >> 17;

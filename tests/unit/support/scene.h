@@ -2,7 +2,7 @@
 #ifndef TAPER_TEST_SCENE_H
 #define TAPER_TEST_SCENE_H
 
-#include "taper/types.h"
+#include "taper/rows.h"
 
 /** Four single-phase connectors, 230 V, 6..32 A: 0 and 1 under "left" (group 1), 2 and 3 under "right" (group 2). */
 const taper_station_config_t *scene_four(void);
@@ -18,6 +18,10 @@ taper_snapshot_t scene_snapshot(uint32_t now_ms, uint8_t active);
 
 /** A proposal that wishes `wish_W` for every connector, ceiling equal to the wish, served in index order. */
 taper_proposal_t scene_proposal(int32_t wish_W);
+
+/** The rows of now; overwritten by the next call. */
+const taper_rows_t *scene_rows(const taper_station_config_t *station, const taper_snapshot_t *snapshot,
+                               const taper_supply_t *supply);
 
 /** Next value of a small fixed pseudo-random generator (xorshift32); `state` must not be 0. */
 uint32_t scene_random(uint32_t *state);

@@ -28,6 +28,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "taper/rows.h"
 #include "taper/types.h"
 
 /** One connector. All of it belongs to a session; another one begins anew. */
@@ -69,15 +70,15 @@ typedef struct {
 void taper_allocator_init(taper_allocator_t *allocator);
 
 /**
- * Bound `proposal` by the limits of connectors, vehicles and groups; `supply` (negative counts as 0) bounds group 0
- * besides its own limits. `reserved_mA` [connectors] is what each draws whatever it is told: silent, deaf, or out of hand;
- * its own setpoint counts up to that without more room. NULL: nothing. Times are those of the snapshot.
+ * Bound `proposal` by the limits of connectors, vehicles and groups; `rows` are those of now. `reserved_mA` [connectors] is
+ * what each draws whatever it is told: silent, deaf, or out of hand; its own setpoint counts up to that without more room.
+ * NULL: nothing. Times are those of the snapshot.
  * Cost: O(connectors x depth of the tree), a few times, and O(connectors^2) comparisons at worst for the order. Stack: about
- * 60 bytes per connector and 220 per group.
+ * 20 bytes per connector and 220 per group.
  */
 void taper_allocate(taper_allocator_t *allocator, const taper_station_config_t *config,
                     const taper_snapshot_t *snapshot, const taper_proposal_t *proposal,
-                    const taper_supply_t *supply, const int32_t *reserved_mA, taper_setpoints_t *setpoints);
+                    const taper_rows_t *rows, const int32_t *reserved_mA, taper_setpoints_t *setpoints);
 
 /** The turn of a connector, to be kept. `now_ms` is that of a snapshot. */
 taper_turn_kept_t taper_allocator_keep(const taper_allocator_t *allocator, uint8_t connector,
@@ -97,7 +98,7 @@ taper_waiting_t taper_allocator_waiting(const taper_allocator_t *allocator, uint
  * (connectors + groups) x 2 times O(connectors x depth).
  */
 void taper_balance(const taper_station_config_t *config, const taper_snapshot_t *snapshot,
-                   const uint8_t *rank, taper_setpoints_t *setpoints);
+                   const taper_rows_t *rows, const uint8_t *rank, taper_setpoints_t *setpoints);
 
 /**
  * Whether `setpoints` hold every limit of connectors, groups, phases and imbalance, recomputed from nothing. Currents of

@@ -21,6 +21,7 @@
 #include <stdint.h>
 
 #include "taper/message.h"
+#include "taper/rows.h"
 #include "taper/types.h"
 
 /** Counters of SETPOINT, and so setpoints that the echo can tell apart. */
@@ -47,6 +48,7 @@ typedef struct {
     uint32_t sent_ms[TAPER_LEDGER_SETPOINTS];
     uint16_t open;   /**< bit c: the setpoint with counter c may be in force, now or later */
     uint16_t echoed; /**< bit c: that, or a report on its way may still name it */
+    int32_t open_mA, open_fallback_mA; /**< the most of these two lists that is open */
     taper_ledger_fade_t
         fade[TAPER_LEDGER_FADES]; /**< mA falling, times not; mA 0: free, and so are all behind */
     int32_t
@@ -121,13 +123,13 @@ int32_t taper_ledger_unreached_mA(const taper_ledger_t *ledger, uint8_t connecto
 
 /**
  * Bound `target`, which holds every limit by itself, by what others may still draw: decreases go through, increases in the
- * order of `rank` as far as room is left in every row. Below a row that is overdrawn (its limit fell, or a vehicle over-draws)
- * nobody is told more than last, so the excess ends when the slowest vehicle has followed. `granted <= target` for every
- * connector, and at least the minimum current or nothing. Where a group limits its imbalance, that holds for what is
- * granted too. Cost: O(connectors x depth of the tree), and that of taper_balance().
+ * order of `rank` as far as room is left in every row of `rows`, those of now. Below a row that is overdrawn (its limit fell,
+ * or a vehicle over-draws) nobody is told more than last, so the excess ends when the slowest vehicle has followed.
+ * `granted <= target` for every connector, and at least the minimum current or nothing. Where a group limits its imbalance,
+ * that holds for what is granted too. Cost: O(connectors x depth of the tree), and that of taper_balance().
  */
 void taper_ledger_grant(const taper_ledger_t *ledger, const taper_station_config_t *config,
-                        const taper_snapshot_t *snapshot, const uint8_t *rank, const taper_supply_t *supply,
+                        const taper_snapshot_t *snapshot, const uint8_t *rank, const taper_rows_t *rows,
                         const taper_setpoints_t *target, taper_setpoints_t *granted);
 
 /**
@@ -137,8 +139,9 @@ void taper_ledger_grant(const taper_ledger_t *ledger, const taper_station_config
  * from nobody. While the sum is above (the limit fell, or after a start) nobody is told more than last. Cost: O(connectors).
  */
 void taper_ledger_grant_fallback(const taper_ledger_t *ledger, const taper_station_config_t *config,
-                                 const taper_snapshot_t *snapshot, const uint8_t *rank, int32_t failsafe_W,
-                                 const taper_setpoints_t *granted, taper_setpoints_t *fallback);
+                                 const taper_snapshot_t *snapshot, const taper_rows_t *rows,
+                                 const uint8_t *rank, int32_t failsafe_W, const taper_setpoints_t *granted,
+                                 taper_setpoints_t *fallback);
 
 /**
  * The guard of the hand-over, recomputed from nothing: with `granted` sent, what all connectors may draw exceeds no limit

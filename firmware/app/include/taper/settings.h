@@ -47,8 +47,9 @@ typedef struct {
     int32_t min_dc_mA;             /**< of every DC connector */
     int32_t price_weight_permille; /**< 0..1000 */
     uint32_t tick_ms;              /**< control tick; 0: as described */
-    uint16_t iterations_per_tick; /**< solver iterations in a tick, >= TAPER_MIN_SLICE; 0: the caller's own */
-    uint8_t proposer;             /**< taper_proposer_t */
+    uint16_t
+        iterations_per_tick; /**< solver iterations in a tick, <= TAPER_MAX_ITERATIONS; 0: the caller's own */
+    uint8_t proposer;        /**< taper_proposer_t */
 } taper_settings_t;
 
 /** A description with settings in it. `config` points into it: it must stay where it is. */

@@ -218,13 +218,14 @@ typedef struct {
     uint32_t solve_us;           /**< spent on the present problem */
     taper_limit_now_t limit_now; /**< of the last step */
     taper_snapshot_t snapshot;   /**< of the last step */
+    taper_rows_t rows;           /**< of these two: all limits of this step, and what counts against them */
     taper_proposal_t proposal;   /**< of the last step */
     taper_setpoints_t target;    /**< of the last step: what holds every limit once all have followed */
     taper_setpoints_t shaped;    /**< of that, what may be told by now (shape.h) */
     taper_setpoints_t setpoints; /**< what is sent: of that, what is paid for */
     taper_setpoints_t fallback;  /**< fallback currents that go with them */
     taper_setpoints_t inverse, fallback_inverse;        /**< of these two, bit by bit: fault 48 */
-    int64_t row_sum[TAPER_MAX_GROUPS][TAPER_ROW_KINDS]; /**< of the targets: mW, uA */
+    int64_t row_sum[TAPER_MAX_GROUPS][TAPER_ROW_KINDS]; /**< [rows.count] of the targets: mW, uA */
     taper_prospect_t prospect[TAPER_MAX_CONNECTORS];
     uint32_t stepped_ms; /**< time of the last step */
     bool stepped;

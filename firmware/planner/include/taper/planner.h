@@ -52,7 +52,7 @@ typedef struct {
     taper_verdict_t verdict;
     taper_work_t next;
     uint16_t iterations;                   /**< spent on the present problem */
-    uint8_t slices;                        /**< of the present problem */
+    uint16_t slices;                       /**< of the present problem */
     uint32_t started_ms;                   /**< time of the snapshot that the problem is for */
     uint8_t session[TAPER_MAX_CONNECTORS]; /**< whose trajectory the warm start holds; 0: nobody's */
     bool matrix_is_current;                /**< the solver's factorisation is that of its matrices' values */
@@ -61,7 +61,7 @@ typedef struct {
 /**
  * Tie a planner to its solver.
  * @return TAPER_ERR_CONFIG if the solver was generated for another shape than `config`, or refuses its matrices.
- * Cost: a factorisation.
+ * Cost: two factorisations.
  */
 taper_status_t taper_planner_init(taper_planner_t *planner, const taper_solver_t *solver,
                                   const taper_station_config_t *config);

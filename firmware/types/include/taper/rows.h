@@ -68,6 +68,23 @@ taper_booking_t taper_booking_nominal(const taper_station_config_t *config, uint
 taper_booking_t taper_booking_now(const taper_station_config_t *config, const taper_snapshot_t *snapshot,
                                   uint8_t i);
 
+/**
+ * The rows of a station at one instant, worked out once for all that look at them: the allocator, what the ledger grants, and
+ * the reasons. The guards do not. Kinds that no group limits are left out; the others stand in their order.
+ */
+typedef struct {
+    uint8_t count;                                         /**< kinds */
+    uint8_t sums;                                          /**< the first of them: below TAPER_ROW_SUMS */
+    uint8_t kind[TAPER_ROW_KINDS];                         /**< [count] taper_row_kind_t */
+    int32_t limit[TAPER_MAX_GROUPS][TAPER_ROW_KINDS];      /**< [count] taper_row_limit_now() by group */
+    int32_t weight[TAPER_MAX_CONNECTORS][TAPER_ROW_KINDS]; /**< [count] taper_row_weight() by connector */
+    taper_booking_t booking[TAPER_MAX_CONNECTORS];         /**< taper_booking_now(), which that is of */
+} taper_rows_t;
+
+/** List them. Cost: O((connectors + groups) x kinds). */
+void taper_rows_now(taper_rows_t *rows, const taper_station_config_t *config,
+                    const taper_snapshot_t *snapshot, const taper_supply_t *supply);
+
 /** Supply phases of the first `conductors` (1..3) of a connector that is wired like `rotation`: bit 0 L1 .. bit 2 L3. */
 uint8_t taper_rotation_phases(taper_rotation_t rotation, uint8_t conductors);
 
