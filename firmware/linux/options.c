@@ -60,12 +60,12 @@ static const struct argp_option options[] = {
     {"tick-ms", KEY_TICK, "N", 0, "Control tick [ms], 20..1000 (default: the station's own, 1000)", 0},
     {"time-scale", KEY_SCALE, "S", 0, "Simulation: run S times faster, 1..1000 (default: 1; see below)", 0},
     {"iterations", KEY_ITERATIONS, "N", 0,
-     "Solver iterations in a control tick, 10..500 (default: 50; 500 if the tick stands for 10 s or more)",
+     "Solver iterations in a control tick, 1..500; fewer than 10 bound its work (default: 50; 500 if the "
+     "tick stands for 10 s or more)",
      0},
     {"no-planner", KEY_NO_PLANNER, NULL, 0, "Charge by earliest deadline first", 0},
     {"record", KEY_RECORD, "FILE", 0, "Record all frames in this file (see below)", 0},
-    {"store", KEY_STORE, "FILE", 0, "Keep what outlives a restart in FILE.0, FILE.1 (default: nowhere)",
-     0},
+    {"store", KEY_STORE, "FILE", 0, "Keep what outlives a restart in FILE.0, FILE.1 (default: nowhere)", 0},
     {"log-level", KEY_LOG_LEVEL, "L", 0, "error, warning, info or debug (default: info)", 0},
     {0},
 };

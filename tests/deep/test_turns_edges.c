@@ -113,6 +113,63 @@ static void test_whoever_has_any_current_is_on_and_does_not_wait(void) {
     }
 }
 
+static void test_a_turn_that_is_kept_goes_on_as_much_later(void) {
+    const taper_turn_t before = {.on = true,
+                                 .switched = true,
+                                 .place = 1,
+                                 .session = 1,
+                                 .since_ms = 2000,
+                                 .waiting_ms = 3000,
+                                 .owed_mWs = -1234567,
+                                 .lacks_mW = 5};
+    tree.allocator.turn[1] = before;
+    const taper_turn_kept_t kept = taper_allocator_keep(&tree.allocator, 1, 62999);
+    TEST_ASSERT_TRUE(kept.on && kept.switched && kept.waits);
+    TEST_ASSERT_EQUAL_UINT32(60, kept.since_s);
+    TEST_ASSERT_EQUAL_UINT32(59, kept.waiting_s);
+    TEST_ASSERT_EQUAL_INT32(-1234, kept.owed_Ws);
+    taper_allocator_restore(&tree.allocator, 0, 7, &kept, 100, 50000); /* a clock that began anew */
+    const taper_turn_t *after = &tree.allocator.turn[0];
+    TEST_ASSERT_TRUE(after->on && after->switched);
+    TEST_ASSERT_EQUAL_UINT8(7, after->session);
+    TEST_ASSERT_EQUAL_UINT8(1, after->place);
+    TEST_ASSERT_EQUAL_UINT32(160000, taper_elapsed_ms(50000, after->since_ms));
+    TEST_ASSERT_EQUAL_UINT32(159000, taper_elapsed_ms(50000, after->waiting_ms));
+    TEST_ASSERT_EQUAL_INT64(-1234000, after->owed_mWs);
+    TEST_ASSERT_EQUAL_INT64(0, after->lacks_mW);
+}
+
+static void test_a_turn_of_nobody_is_kept_as_such(void) {
+    tree.allocator.turn[1].place = 0;
+    const taper_turn_kept_t kept = taper_allocator_keep(&tree.allocator, 1, 0);
+    TEST_ASSERT_FALSE(kept.on || kept.switched || kept.waits);
+    taper_allocator_restore(&tree.allocator, 1, 3, &kept, 0, 0);
+    TEST_ASSERT_EQUAL_UINT8(0, tree.allocator.turn[1].place);
+    TEST_ASSERT_FALSE(tree.allocator.turn[1].on || tree.allocator.turn[1].switched);
+}
+
+static void test_a_debt_beyond_all_is_kept_as_the_greatest_that_can_be(void) {
+    tree.allocator.turn[1].owed_mWs = INT64_MAX;
+    TEST_ASSERT_EQUAL_INT32(INT32_MAX, taper_allocator_keep(&tree.allocator, 1, 0).owed_Ws);
+}
+
+static void test_no_turn_is_older_than_the_clock_can_tell(void) {
+    taper_turn_kept_t kept = {.since_s = 999999, .waiting_s = UINT32_MAX};
+    taper_allocator_restore(&tree.allocator, 1, 1, &kept, 0, 5);
+    TEST_ASSERT_EQUAL_UINT32(999999000u, taper_elapsed_ms(5, tree.allocator.turn[1].since_ms));
+    TEST_ASSERT_EQUAL_UINT32(1000000000u, taper_elapsed_ms(5, tree.allocator.turn[1].waiting_ms));
+    taper_allocator_restore(&tree.allocator, 1, 1, &kept, UINT32_MAX, 5);
+    TEST_ASSERT_EQUAL_UINT32(1000000000u, taper_elapsed_ms(5, tree.allocator.turn[1].since_ms));
+}
+
+static void test_every_switch_is_counted_once(void) {
+    tree_start(&tree, 2, 2);
+    tree_allocate(&tree);
+    TEST_ASSERT_EQUAL_UINT32(2, tree.allocator.switches);
+    tree_allocate_after(&tree, 1000);
+    TEST_ASSERT_EQUAL_UINT32(2, tree.allocator.switches);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_who_stands_beyond_the_last_connector_has_no_turn);
@@ -124,5 +181,10 @@ int main(void) {
     RUN_TEST(test_who_is_on_stays_for_the_last_of_what_it_is_owed);
     RUN_TEST(test_a_queue_begins_empty);
     RUN_TEST(test_whoever_has_any_current_is_on_and_does_not_wait);
+    RUN_TEST(test_a_turn_that_is_kept_goes_on_as_much_later);
+    RUN_TEST(test_a_turn_of_nobody_is_kept_as_such);
+    RUN_TEST(test_a_debt_beyond_all_is_kept_as_the_greatest_that_can_be);
+    RUN_TEST(test_no_turn_is_older_than_the_clock_can_tell);
+    RUN_TEST(test_every_switch_is_counted_once);
     return UNITY_END();
 }

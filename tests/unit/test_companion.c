@@ -135,7 +135,7 @@ static void test_values_that_no_station_can_have_are_refused(void) {
         {"failsafe_W=10500", "failsafe_W=11001", "5: failsafe_W: not a whole number in 0..11000: '11001'"},
         {"tick_ms=500", "tick_ms=19", "6: tick_ms: not a whole number in 20..1000: '19'"},
         {"time_scale=60", "time_scale=0", "7: time_scale: not a whole number in 1..1000: '0'"},
-        {"iterations=70", "iterations=70 ", "8: iterations: not a whole number in 10..500: '70 '"},
+        {"iterations=70", "iterations=70 ", "8: iterations: not a whole number in 1..500: '70 '"},
         {"planner=no", "planner=maybe", "9: planner: not yes or no: 'maybe'"},
         {"123000", "123456", "10: start_us: not a whole millisecond: '1700000000123456'"},
         {"bus_0=vcan0", "bus_0=a b", "11: bus_0: not the name of an interface: 'a b'"},

@@ -45,6 +45,34 @@ static void test_after_a_start_a_late_proof_makes_it_last_no_longer(void) {
     bench_assert_changes_after(REACTION_ms - 1, 32000, 0);
 }
 
+static void test_a_setpoint_is_accepted_when_its_echo_cannot_be_of_an_earlier_life(void) {
+    bench_start(1);
+    bench_send(0, 6000, 0);
+    bench_send(1, 6000, 0);
+    bench_hear_echo(0);
+    bench_hear_echo(0);
+    TEST_ASSERT_FALSE(taper_ledger_is_accepted(&ledger, 0));
+    bench_hear_echo(7); /* of long ago */
+    TEST_ASSERT_FALSE(taper_ledger_is_accepted(&ledger, 0));
+    bench_hear_echo(1);
+    TEST_ASSERT_TRUE(taper_ledger_is_accepted(&ledger, 0));
+    bench_start(1);
+    bench_hear_fallback(); /* what comes now is ours, but nothing came yet */
+    TEST_ASSERT_FALSE(taper_ledger_is_accepted(&ledger, 0));
+    bench_send(0, 6000, 0);
+    bench_hear_echo(0);
+    TEST_ASSERT_TRUE(taper_ledger_is_accepted(&ledger, 0));
+}
+
+static void test_a_start_is_over_when_nothing_of_an_earlier_life_is_in_force_anywhere(void) {
+    bench_start(1);
+    TEST_ASSERT_TRUE(taper_ledger_is_starting(&ledger));
+    bench_wait_ms(EXPIRED_ms + REACTION_ms - 1);
+    TEST_ASSERT_TRUE(taper_ledger_is_starting(&ledger));
+    bench_wait_ms(1);
+    TEST_ASSERT_FALSE(taper_ledger_is_starting(&ledger));
+}
+
 static void test_after_a_start_two_different_echoes_prove_ours(void) {
     connectors[0].fallback_mA = 7000;
     bench_start(1);
@@ -116,6 +144,8 @@ int main(void) {
     RUN_TEST(test_after_a_start_its_maximum_counts_until_it_is_left_and_then_its_fallback_current);
     RUN_TEST(test_after_a_start_fallback_ends_it_sooner_and_only_once);
     RUN_TEST(test_after_a_start_a_late_proof_makes_it_last_no_longer);
+    RUN_TEST(test_a_setpoint_is_accepted_when_its_echo_cannot_be_of_an_earlier_life);
+    RUN_TEST(test_a_start_is_over_when_nothing_of_an_earlier_life_is_in_force_anywhere);
     RUN_TEST(test_after_a_start_two_different_echoes_prove_ours);
     RUN_TEST(test_after_a_start_the_first_echo_is_ours_when_no_other_can_be_heard);
     RUN_TEST(test_after_a_start_an_echo_after_fallback_is_ours);

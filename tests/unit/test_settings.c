@@ -213,7 +213,7 @@ static bool write_until_power_goes(void *context, unsigned area, unsigned copy, 
     return whole.store_write(context, area, copy, data, length);
 }
 
-static void test_whenever_power_goes_while_settings_are_saved_old_or_new_ones_hold(void) {
+static void test_row_30_whenever_power_goes_while_settings_are_saved_old_or_new_ones_hold(void) {
     const taper_settings_t before = all_set();
     taper_settings_t after = before;
     after.limit_W = 20000;
@@ -283,7 +283,7 @@ static void test_of_two_good_copies_the_newer_one_counts_when_the_sequence_wraps
     }
 }
 
-static void test_settings_that_are_lost_leave_the_failsafe_limit_until_they_are_set_again(void) {
+static void test_row_30_settings_that_are_lost_leave_the_failsafe_limit_until_they_are_set_again(void) {
     taper_settings_t settings = all_set();
     TEST_ASSERT_TRUE(taper_settings_save(&port, &settings));
     taper_membus_rot(&bus, TAPER_STORE_SETTINGS, 0, 100);
@@ -331,10 +331,10 @@ int main(void) {
     RUN_TEST(test_what_was_saved_is_loaded_and_both_copies_hold_it);
     RUN_TEST(test_absent_settings_stay_absent);
     RUN_TEST(test_the_bytes_are_as_the_layout_says_on_every_machine);
-    RUN_TEST(test_whenever_power_goes_while_settings_are_saved_old_or_new_ones_hold);
+    RUN_TEST(test_row_30_whenever_power_goes_while_settings_are_saved_old_or_new_ones_hold);
     RUN_TEST(test_every_single_bit_that_rots_in_either_copy_is_found_and_mended);
     RUN_TEST(test_of_two_good_copies_the_newer_one_counts_when_the_sequence_wraps_too);
-    RUN_TEST(test_settings_that_are_lost_leave_the_failsafe_limit_until_they_are_set_again);
+    RUN_TEST(test_row_30_settings_that_are_lost_leave_the_failsafe_limit_until_they_are_set_again);
     RUN_TEST(test_settings_of_another_layout_are_refused_and_kept_until_somebody_saves);
     RUN_TEST(test_a_site_without_a_failsafe_limit_is_left_a_watt_when_settings_are_lost);
     return UNITY_END();

@@ -40,7 +40,7 @@ class Scene:
                 f"{self.limit_kw:g}", "--tick-s", str(tick_s), "--iterations", str(iterations)]
 
 
-SCENES = {"hub": Scene("hub", 8, 20.0), "garage": Scene("garage", 54, 100.0, 40)}
+SCENES = {"hub": Scene("hub", 8, 20.0), "garage": Scene("garage", 54, 100.0, 130)}
 WHOLE_SOLVE = 500
 
 
@@ -65,18 +65,18 @@ def simulate(program: Path, image: Path, scene: Scene, iterations: int, folder: 
 
 
 def figures(program: Path, image: Path, scene: Scene, iterations: int, folder: Path) -> dict[str, int]:
-    """Instructions and stack. One run is with the board's own slices, one with whole solves."""
+    """Instructions and stack. One run is with the board's own slices, one with whole solves, so that most ticks have none."""
     short = simulate(program, image, scene, iterations, folder)
     whole = simulate(program, image, scene, WHOLE_SOLVE, folder)
     ticks, all_at_once = short["board"]["instructions_per_tick"], whole["board"]["instructions_per_tick"]
     solve = all_at_once["max"] - all_at_once["max_without_slice"]
     return {
-        "tick_median": round(ticks["p50"]),
-        "tick_worst_without_slice": ticks["max_without_slice"],
+        "tick_median": round(all_at_once["p50"]),
+        "tick_worst_without_slice": max(ticks["max_without_slice"], all_at_once["max_without_slice"]),
         "tick_worst": ticks["max"],
         "poll_worst": short["board"]["max_instructions_per_poll"],
         "iteration": round(solve / whole["iterations"]["max"]),
-        "stack_used_B": short["board"]["stack_used_b"],
+        "stack_used_B": max(run["board"]["stack_used_b"] for run in (short, whole)),
     }
 
 
@@ -132,10 +132,9 @@ def summary(steps: list[Calls]) -> dict[str, int]:
     iterations, iterating = sum(step.iterations for step in steps), sum(step.iterating for step in steps)
     if not without or iterations == 0:
         raise RunFailed("callgrind saw no tick without a slice, or no iteration")
-    every = sorted(step.total for step in steps)
     return {
-        "host_tick_median": every[len(every) // 2],
+        "host_tick_median": without[len(without) // 2],
         "host_tick_worst_without_slice": without[-1],
-        "host_tick_worst": every[-1],
+        "host_tick_worst": max(step.total for step in steps),
         "host_iteration": round(iterating / iterations),
     }

@@ -164,9 +164,9 @@ class CallGraph:
         archive = re.match(r"(.*/)lib([^/]+)\.a\((.+)\)$", file)
         if archive:
             folder = self.image.build / archive[1] / "CMakeFiles" / f"{archive[2]}.dir"
-            found = sorted(folder.rglob(re.sub(r"\.obj?$", ".ci", archive[3])))
+            found = sorted(folder.rglob(re.sub(r"\.o(bj)?$", ".ci", archive[3])))
         else:
-            found = [self.image.build / re.sub(r"\.obj?$", ".ci", file)]
+            found = [self.image.build / re.sub(r"\.o(bj)?$", ".ci", file)]
         if len(found) != 1 or not found[0].exists():
             raise StackUnknown(f"{file}: no .ci file beside it; compile with -fcallgraph-info=su and build anew")
         return CompilerInfo(found[0], self.folders)
@@ -297,7 +297,9 @@ class CompilerInfo:
         file, line, column = place.rsplit(":", 2)
         text = Path(file).read_text().splitlines()[int(line) - 1][int(column) - 1:]
         expression = re.match(r"[\w.>\-\[\]]+", text)
-        return f"{self._short(file)}: {expression[0] if expression else text}"
+        if not expression:
+            raise StackUnknown(f"{place}: no call stands there: the source is newer than the image; build it")
+        return f"{self._short(file)}: {expression[0]}"
 
 
 def pushed_B(name: str, operands: str) -> int:

@@ -72,7 +72,7 @@ class Piece:
 
     @property
     def object(self) -> str:
-        return re.sub(r"(\.c)?\.obj?$", "", re.sub(r".*[/(]", "", self.file).rstrip(")"))
+        return re.sub(r"(\.c)?\.o(bj)?$", "", re.sub(r".*[/(]", "", self.file).rstrip(")"))
 
     @property
     def is_solver_workspace(self) -> bool:

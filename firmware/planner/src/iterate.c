@@ -1,7 +1,9 @@
 #include "iterate.h"
 
 #include <math.h>
+#include <string.h>
 
+#include "algebra_impl.h"
 #include "algebra_vector.h"
 #include "auxil.h"
 #include "types.h"
@@ -49,6 +51,11 @@ static bool all_finite(const OSQPVectorf *vector) {
 
 bool taper_iterates_are_finite(const OSQPSolver *osqp) {
     return all_finite(osqp->work->x) && all_finite(osqp->work->y);
+}
+
+void taper_forget_equalities(OSQPSolver *osqp) {
+    OSQPVectori *types = osqp->work->constr_type;
+    memset(types->values, 0, (size_t)types->length * sizeof types->values[0]);
 }
 
 void taper_store_iterates(OSQPSolver *osqp) {

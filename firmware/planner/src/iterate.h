@@ -25,6 +25,9 @@ OSQPFloat taper_balancing_penalty(const OSQPSolver *osqp);
 /** Whether all iterates are finite. Cost: O(rows), as everything else here. */
 bool taper_iterates_are_finite(const OSQPSolver *osqp);
 
+/** Take no row for an equality. With the next bounds that differs, so that they are looked at anew. */
+void taper_forget_equalities(OSQPSolver *osqp);
+
 /** Copy the iterates into `osqp->solution`. */
 void taper_store_iterates(OSQPSolver *osqp);
 

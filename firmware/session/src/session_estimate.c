@@ -7,9 +7,7 @@ static int32_t energy_at(int32_t soc_permille, int32_t capacity_Wh) {
 }
 
 int32_t taper_session_capacity_Wh(const taper_session_t *session) {
-    const int32_t capacity_Wh = session->used.a.capacity_Wh; /* TAPER_ABSENT is below the range, too */
-    const bool sound = capacity_Wh >= TAPER_CAPACITY_MIN_Wh && capacity_Wh <= TAPER_CAPACITY_MAX_Wh;
-    return session->in_session && sound ? capacity_Wh : 0;
+    return session->in_session ? taper_session_sound_capacity_Wh(session->used.a.capacity_Wh) : 0;
 }
 
 bool taper_session_soc_is_fresh(const taper_session_t *session, uint32_t now_ms) {

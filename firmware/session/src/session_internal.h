@@ -36,6 +36,13 @@ bool taper_session_kept_is_another(const taper_session_t *session);
 /** The wall clock is set for the first time: so long did the restart take. */
 void taper_session_end_restart(taper_session_table_t *table, uint32_t unix_s, uint32_t at_ms);
 
+/** A capacity that was told; 0 if it was not, or is absurd. */
+static inline int32_t taper_session_sound_capacity_Wh(int32_t told_Wh) {
+    const bool sound =
+        told_Wh >= TAPER_CAPACITY_MIN_Wh && told_Wh <= TAPER_CAPACITY_MAX_Wh; /* absent is below */
+    return sound ? told_Wh : 0;
+}
+
 /** Capacity of the vehicle in session; 0 if it is unknown or absurd. */
 int32_t taper_session_capacity_Wh(const taper_session_t *session);
 

@@ -84,8 +84,8 @@ bool taper_session_restore(taper_session_table_t *table, uint8_t connector,
     session->ev.soc_age_s = TAPER_ABSENT;
     session->ev.max_mA = TAPER_ABSENT;
     session->session_Wh = kept->session_Wh;
-    session->stored_Wh = taper_min_i32(kept->stored_Wh, taper_max_i32(kept->used.a.capacity_Wh, 0));
-    session->stored_of_Wh = kept->used.a.capacity_Wh;
+    session->stored_of_Wh = taper_session_sound_capacity_Wh(kept->used.a.capacity_Wh);
+    session->stored_Wh = taper_min_i32(kept->stored_Wh, session->stored_of_Wh);
     session->anchor_Wh = kept->anchor_Wh;
     session->plugged_in_ms = 0u - kept->stay_s / table->time_scale * 1000u;
     session->kept = true;
