@@ -129,7 +129,6 @@ void account_station_started(account_t *account) {
         book->told_vehicle_ms = account->now_ms;
         book->told_conductors = 3;
         book->tick_conductors = 3;
-        memset(book->told_session, 0, sizeof book->told_session);
         memset(&book->status, 0, sizeof book->status);
         memset(&book->params, 0, sizeof book->params);
     }

@@ -100,7 +100,7 @@ typedef struct {
     int64_t told_vehicle_ms;
     uint8_t told_conductors; /**< or seen to carry current */
     uint8_t tick_conductors; /**< the same at the last control tick */
-    uint8_t told_session[2]; /**< by EV_PARAM_A: the last, and the one before */
+    uint8_t told_session[2]; /**< by EV_PARAM_A: the last, and the one before; the store keeps sessions over a restart */
 
     bool wants;
     int64_t waits_since_ms;

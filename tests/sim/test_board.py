@@ -114,9 +114,12 @@ def test_what_was_measured_is_told(sim):
     with twin() as bus:
         there = run(sim, "--bus", bus, policy="edf")
     assert there.summary["solve_ms"] is None
+    frames = {key: there.summary["board"][key]
+              for key in ("mean_instructions_per_frame", "max_instructions_for_frames_of_tick")}
+    assert 0 < frames["mean_instructions_per_frame"] <= 1000 <= frames["max_instructions_for_frames_of_tick"]
     assert there.summary["board"] == {
         "instructions_per_tick": {"p50": 1000, "max": 1000, "max_without_slice": 1000},
-        "max_instructions_per_poll": 1000, "stack_used_b": 1234, "stack_size_b": 8192}
+        "max_instructions_per_poll": 1000, **frames, "stack_used_b": 1234, "stack_size_b": 8192}
     assert "instructions per tick p50 1000" in there.stdout
     assert "stack 1234 of 8192 bytes" in there.stdout
 
