@@ -87,7 +87,7 @@ def simulate(options: argparse.Namespace, build: Build, limit_kw: float, session
     """@return what the image reported besides its starts: nothing, if all went well."""
     with emulated(build.image) as board:
         command = [str(options.sim), "--sessions", str(sessions), "--station", build.station, "--policy", options.policy,
-                   "--limit-kw", f"{limit_kw:g}", "--tick-s", f"{options.tick_s:g}",
+                   "--limit-kw", f"{limit_kw:g}", "--tick-s", f"{options.tick_s:g}", "--iterations", str(options.iterations),
                    "--bus", f"slcan:127.0.0.1:{board.port}", "--out", str(options.out)]
         try:
             done = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, check=False)
@@ -128,6 +128,8 @@ def report(build: Build, summary: dict, limit_kw: float, seconds: float) -> list
         f"  instructions      per tick: median {number(per_tick['p50'])}, worst {number(per_tick['max'])}, "
         f"worst without a solver slice {number(per_tick['max_without_slice'])}",
         f"                    per poll: worst {number(board['max_instructions_per_poll'])}",
+        f"                    per frame, taken in as it comes: mean {number(board['mean_instructions_per_frame'])}, "
+        f"all of a tick: worst {number(board['max_instructions_for_frames_of_tick'])}",
         *memory_lines(Image(build.image)),
         f"  stack             {stack}",
         f"  map               {build.map.relative_to(ROOT)}",
@@ -142,7 +144,9 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--limit-kw", type=positive, help="site limit [kW] (default: a third of what the cars that find a "
                         f"connector could draw at once, {KW_PER_CAR} kW each)")
     parser.add_argument("--policy", default="soc-mpc", help="of taper-sim (default soc-mpc)")
-    parser.add_argument("--tick-s", type=positive, default=60.0, help="control tick [s] (default 60)")
+    parser.add_argument("--tick-s", type=positive, default=30.0, help="control tick [s] (default 30)")
+    parser.add_argument("--iterations", type=int, default=9, help="of the solver in a tick: below 10 its work is bounded, and a "
+                        "plan takes some 15 ticks (default 9)")
     parser.add_argument("--sim", type=Path, default=SIMULATOR, help=f"default {SIMULATOR.relative_to(ROOT)}")
     parser.add_argument("--out", type=Path, help="folder for the simulator's files (default build/board/PRESET)")
     return parser.parse_args(arguments)

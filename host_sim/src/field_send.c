@@ -51,17 +51,27 @@ static uint32_t status_key(const taper_evse_status_t *status) {
            (uint32_t)status->ev_present << 10;
 }
 
-/** What of a message is worth a frame when it changes. Never 0, with which slots start. */
-static uint32_t key_of(const sim_evse_t *evse, const taper_message_t *message) {
+/**
+ * What of a message is worth a frame when it changes. Never 0, with which slots start. A message is made only where its
+ * content tells: this is asked at every poll, of every connector.
+ */
+static uint32_t key_of(const sim_evse_t *evse, sim_evse_frame_t frame) {
     const uint32_t session = (uint32_t)evse->session << 24;
-    switch (message->kind) {
-    case TAPER_MESSAGE_EVSE_STATUS: return 1u << 23 | status_key(&message->as.evse_status);
-    case TAPER_MESSAGE_EV_STATUS:
-        return session | (uint32_t)(message->as.ev_status.soc_permille / SOC_STEP_PERMILLE) << 1 |
-               (uint32_t)message->as.ev_status.complete;
-    case TAPER_MESSAGE_EVSE_ELEC:
-        return session | (uint32_t)(message->as.evse_elec.energy_Wh / ENERGY_STEP_WH);
-    case TAPER_MESSAGE_EVSE_INFO: return 1;
+    switch (frame) {
+    case SIM_EVSE_STATUS: {
+        const taper_message_t message = sim_evse_message(evse, frame);
+        return 1u << 23 | status_key(&message.as.evse_status);
+    }
+    case SIM_EV_STATUS: {
+        const taper_message_t message = sim_evse_message(evse, frame);
+        return session | (uint32_t)(message.as.ev_status.soc_permille / SOC_STEP_PERMILLE) << 1 |
+               (uint32_t)message.as.ev_status.complete;
+    }
+    case SIM_EVSE_ELEC: {
+        const taper_message_t message = sim_evse_message(evse, frame);
+        return session | (uint32_t)(message.as.evse_elec.energy_Wh / ENERGY_STEP_WH);
+    }
+    case SIM_EVSE_INFO: return 1;
     default: return session | evse->revision; // EV_PARAM_A..D
     }
 }
@@ -80,11 +90,11 @@ static void send_connector(sim_field_t *field, unsigned connector) {
         if (!is_said(field, evse, k)) {
             continue;
         }
-        const taper_message_t message = sim_evse_message(evse, (sim_evse_frame_t)k);
-        const uint32_t key = key_of(evse, &message);
+        const uint32_t key = key_of(evse, (sim_evse_frame_t)k);
         if (!sim_slot_is_due(slot, &cycles[k], field->now_ms, key)) {
             continue;
         }
+        const taper_message_t message = sim_evse_message(evse, (sim_evse_frame_t)k);
         if (sim_wire_send(field->options.port, &message, &evse->counter[k])) {
             sim_slot_sent(slot, &cycles[k], field->now_ms, key);
         } else {

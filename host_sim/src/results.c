@@ -219,6 +219,9 @@ static void add_board(cJSON *object, sim_results_t *results) {
     add_known_count(per_tick, "max", counted, work->worst);
     add_known_count(per_tick, "max_without_slice", counted, work->worst_without_slice);
     add_known_count(board, "max_instructions_per_poll", counted, work->worst_poll);
+    add_known_count(board, "mean_instructions_per_frame", hardware->frame_mean > 0, hardware->frame_mean);
+    add_known_count(board, "max_instructions_for_frames_of_tick", hardware->frames_worst > 0,
+                    hardware->frames_worst);
     add_known_count(board, "stack_used_b", has_stack, hardware->stack_used_B);
     add_known_count(board, "stack_size_b", has_stack, hardware->stack_size_B);
 }
@@ -306,6 +309,10 @@ static void print_board(sim_results_t *results, FILE *stream) {
                 "; per poll max %" PRIu32 "\n",
                 sim_samples_spread(&work->ticks).p50, work->worst, work->worst_without_slice,
                 work->worst_poll);
+    }
+    if (results->hardware.frame_mean > 0) {
+        fprintf(stream, "board: instructions per frame mean %" PRIu32 ", for all of a tick max %" PRIu32 "\n",
+                results->hardware.frame_mean, results->hardware.frames_worst);
     }
     if (results->hardware.stack_size_B > 0) {
         fprintf(stream, "board: stack %" PRIu32 " of %" PRIu32 " bytes used\n",

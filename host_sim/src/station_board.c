@@ -198,7 +198,10 @@ static bool hardware(sim_link_t *link, sim_hardware_t *found) {
     found->known = true;
     return check_losses(board) &&
            ask_figure(board, TAPER_DRIVE_STACK_USED_B, "the stack used", &found->stack_used_B) &&
-           ask_figure(board, TAPER_DRIVE_STACK_SIZE_B, "the stack's size", &found->stack_size_B);
+           ask_figure(board, TAPER_DRIVE_STACK_SIZE_B, "the stack's size", &found->stack_size_B) &&
+           ask_figure(board, TAPER_DRIVE_FRAME_MEAN, "the instructions for a frame", &found->frame_mean) &&
+           ask_figure(board, TAPER_DRIVE_FRAMES_WORST, "the instructions for the frames of a tick",
+                      &found->frames_worst);
 }
 
 /** Losses show when the board is asked, at the end. */

@@ -44,6 +44,8 @@ typedef struct {
 typedef struct {
     bool known;
     uint32_t stack_used_B, stack_size_B; /**< size 0: not known */
+    uint32_t frame_mean,
+        frames_worst; /**< instructions to take in a frame, and all that came in a tick; 0: not known */
 } sim_hardware_t;
 
 typedef struct sim_link sim_link_t;

@@ -151,7 +151,7 @@ def test_the_board_tells_what_it_is(drive):
     assert drive.figure("connectors") == 8
     assert drive.figure("name") == zlib.crc32(b"hub")
     assert (drive.figure("stack_used_B"), drive.figure("stack_size_B")) == (1234, 8192)
-    assert len(FIGURES) == 8
+    assert len(FIGURES) == 10
 
 
 def test_strange_messages_are_passed_over(drive):

@@ -8,7 +8,7 @@ DRIVE_ID = 0x1FFF0000
 SETUP, TIME, STEP, POLL, STOP, LOOK, COUNTER, FIGURE, RESET, EXIT, RESUME = 1, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12
 DONE, LOOKED, VALUE, HELLO = 0x81, 0x82, 0x83, 0x84
 FIGURES = ("iterations", "stack_used_B", "stack_size_B", "slice_iterations", "store_writes", "connectors", "name",
-           "has_planner")
+           "has_planner", "frame_mean", "frames_worst")
 MODES = ("INIT", "PLAN", "FALLBACK", "FAILSAFE")
 POLICIES = ("planner", "edf", "llf")
 ABSENT = -0x80000000

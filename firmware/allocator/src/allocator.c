@@ -27,7 +27,9 @@ static void open_rooms(round_t *round, const int32_t *reserved_mA) {
     taper_rooms_open(&round->rooms, round->config, round->rows);
     for (uint8_t i = 0; i < round->config->connector_count; i++) {
         round->reserved_mA[i] = reserved_mA == NULL ? 0 : reserved_mA[i];
-        taper_rooms_draw(&round->rooms, round->config, round->rows, i, round->reserved_mA[i]);
+        if (round->reserved_mA[i] > 0) {
+            taper_rooms_draw(&round->rooms, round->config, round->rows, i, round->reserved_mA[i]);
+        }
     }
     round->keeps = false;
     round->kept = round->rooms;

@@ -45,9 +45,11 @@ static uint8_t lines_of(const taper_connector_config_t *connector) {
 
 /** Power of 1 A in the supply: as booked, but no less than the vehicle draws, with a converter's losses. */
 static int32_t W_per_A_of(const taper_connector_config_t *connector, const taper_demand_t *demand) {
-    const int32_t efficiency = connector->is_dc ? connector->efficiency_permille : 1000;
-    const int64_t drawn_W_per_A = quotient_up((int64_t)demand->W_per_A * 1000, efficiency);
-    return taper_max_i32((int32_t)drawn_W_per_A, demand->booking.W_per_A);
+    int32_t drawn_W_per_A = demand->W_per_A;
+    if (connector->is_dc) {
+        drawn_W_per_A = (int32_t)quotient_up((int64_t)drawn_W_per_A * 1000, connector->efficiency_permille);
+    }
+    return taper_max_i32(drawn_W_per_A, demand->booking.W_per_A);
 }
 
 /** How a connector draws, by the snapshot, or else by its description. */
@@ -112,6 +114,9 @@ static bool fits(int64_t square, int64_t other_uA, int32_t limit_mA) {
 
 /** A line carries the currents x and y of two pairs, which differ by 60 degrees: |I|^2 = x^2 + x y + y^2. */
 static bool line_passes(const load_t *load, unsigned line, int32_t limit_mA) {
+    if (load->pair_uA[line] == 0 && load->pair_uA[(line + 2) % LINES] == 0) {
+        return load->line_uA[line] <= (int64_t)limit_mA * 1000; /* no angles to mind */
+    }
     const int64_t x = pair_uA100(load, line);
     const int64_t y = pair_uA100(load, line + 2);
     return fits(x * x + x * y + y * y, load->line_uA[line], limit_mA);

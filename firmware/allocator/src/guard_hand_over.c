@@ -192,7 +192,8 @@ bool taper_guard_hand_over_passes(const taper_ledger_t *ledger, const taper_stat
         add_connector(config, &snapshot->demand[i], i, taper_max_i32(granted->current_mA[i], may_mA),
                       &after[group]);
     }
-    for (uint8_t k = config->group_count; k-- > 0;) { /* children stand behind their parents */
+    const int32_t groups = taper_min_i32(config->group_count, TAPER_MAX_GROUPS); /* config_check.h: it is */
+    for (int32_t k = groups; k-- > 0;) { /* children stand behind their parents */
         if (!group_passes(&config->groups[k], k == 0 ? supply : &described, &before[k], &after[k])) {
             return false;
         }

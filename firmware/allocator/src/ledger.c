@@ -46,15 +46,17 @@ bool taper_ledger_can_send(const taper_ledger_t *ledger, uint8_t connector, uint
     return !has_bit(ledger->entry[connector].echoed, counter);
 }
 
-/** After `open` has changed. */
+/** After some were closed. */
 static void note_open(taper_ledger_entry_t *entry) {
     int32_t most_dA = 0;
     int32_t most_fallback_dA = 0;
-    for (unsigned c = 0; (unsigned)entry->open >> c != 0; c++) {
-        if (has_bit(entry->open, c)) {
+    unsigned c = 0;
+    for (unsigned left = entry->open; left != 0; left >>= 1) {
+        if ((left & 1u) != 0u) {
             most_dA = taper_max_i32(most_dA, entry->sent_dA[c]);
             most_fallback_dA = taper_max_i32(most_fallback_dA, entry->fallback_dA[c]);
         }
+        c++;
     }
     entry->open_mA = most_dA * TAPER_CURRENT_STEP_mA;
     entry->open_fallback_mA = most_fallback_dA * TAPER_CURRENT_STEP_mA;
@@ -70,7 +72,8 @@ void taper_ledger_sent(taper_ledger_t *ledger, uint8_t connector, uint8_t counte
     entry->last_fallback_mA = fallback_mA;
     set_bit(&entry->open, counter);
     set_bit(&entry->echoed, counter);
-    note_open(entry);
+    entry->open_mA = taper_max_i32(entry->open_mA, current_mA);
+    entry->open_fallback_mA = taper_max_i32(entry->open_fallback_mA, fallback_mA);
 }
 
 /** What the connector may let through by our setpoints. One in force is never below its own fallback current. */
@@ -169,11 +172,13 @@ static void hear_echo(taper_ledger_entry_t *entry, unsigned counter, uint32_t fo
     end_unknown(entry, followed_ms);
     entry->accepts = true;
     entry->over_fallback_mA = 0; /* what is open is younger than what ran out */
-    for (unsigned c = 0; (unsigned)entry->echoed >> c != 0; c++) {
-        if (c != counter && has_bit(entry->echoed, c) && sent_before(entry, c, counter)) {
+    unsigned c = 0;
+    for (unsigned left = entry->echoed; left != 0; left >>= 1) {
+        if ((left & 1u) != 0u && c != counter && sent_before(entry, c, counter)) {
             clear_bit(&entry->open, c);
             clear_bit(&entry->echoed, c);
         }
+        c++;
     }
     note_open(entry);
 }

@@ -43,8 +43,8 @@ static void allow(taper_station_t *station, uint8_t i, uint32_t now_ms) {
     if (more && !conductors->waits) {
         conductors->waits_ms = now_ms;
     }
-    const uint32_t most_ms = over_ms(station, longest_reaction_ms(station->options.config));
-    conductors->waits = more && taper_elapsed_ms(now_ms, conductors->waits_ms) < most_ms;
+    conductors->waits = more && taper_elapsed_ms(now_ms, conductors->waits_ms) <
+                                    over_ms(station, longest_reaction_ms(station->options.config));
     if (!conductors->waits) {
         conductors->allowed = wanted;
     }

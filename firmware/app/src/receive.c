@@ -90,17 +90,18 @@ static taper_counter_t counter_of(taper_e2e_check_t check) {
 static bool is_good(taper_station_t *station, const sender_t *sender, const taper_frame_t *frame) {
     taper_e2e_receiver_t *receiver = sender->receiver;
     const taper_e2e_check_t check = taper_e2e_check(receiver, frame);
+    const bool valid = taper_e2e_is_valid(receiver);
     const taper_counter_t counter = counter_of(check);
     if (counter != TAPER_COUNTERS) {
         taper_station_count(station, counter);
     }
-    if (!taper_e2e_is_valid(receiver)) {
+    if (!valid) {
         note_bad_frames(station, &sender->guard->bad_frames, frame);
     }
     if (check != TAPER_E2E_OK && check != TAPER_E2E_OK_SOME_LOST) {
         return false;
     }
-    if (!taper_e2e_is_valid(receiver)) {
+    if (!valid) {
         taper_station_count(station, TAPER_COUNTER_FRAMES_UNTRUSTED);
         return false;
     }
@@ -150,14 +151,17 @@ static void use_message(taper_station_t *station, const sender_t *sender, const 
         taper_limits_apply_meter(&station->limits, &message->as.site_meter, at_ms);
         break;
     case TAPER_MESSAGE_EMCY: hear_emcy(station, sender, message, at_ms); break;
+    case TAPER_MESSAGE_TIME_SYNC: (void)taper_session_apply(&station->sessions, message, at_ms); break;
     case TAPER_MESSAGE_EVSE_STATUS:
         taper_ledger_hear(&station->ledger, (uint8_t)sender->connector, &message->as.evse_status, at_ms);
-        (void)taper_session_apply(&station->sessions, message, at_ms);
+        (void)taper_session_apply_to(&station->sessions, (uint8_t)sender->connector, message, at_ms);
         if (taper_ledger_is_accepted(&station->ledger, (uint8_t)sender->connector)) {
             taper_session_confirm(&station->sessions, (uint8_t)sender->connector);
         }
         break;
-    default: (void)taper_session_apply(&station->sessions, message, at_ms); break;
+    default:
+        (void)taper_session_apply_to(&station->sessions, (uint8_t)sender->connector, message, at_ms);
+        break;
     }
 }
 

@@ -67,8 +67,7 @@ static void watch_rival(taper_station_t *station, uint32_t now_ms) {
     }
 }
 
-/** What step and poll begin with: the time, the frames, the state of the buses. */
-static void begin(taper_station_t *station, uint32_t now_ms) {
+static void listen(taper_station_t *station, uint32_t now_ms) {
     const taper_station_config_t *config = station->options.config;
     station->events.now_ms = now_ms;
     station->events.unix_s = taper_session_unix_s(&station->sessions, now_ms);
@@ -81,6 +80,11 @@ static void begin(taper_station_t *station, uint32_t now_ms) {
                          taper_saturate_i32(station->record.starts));
     }
     taper_station_receive(station, now_ms);
+}
+
+/** What step and poll begin with: the time, the frames, the state of the buses. */
+static void begin(taper_station_t *station, uint32_t now_ms) {
+    listen(station, now_ms);
     taper_ledger_update(&station->ledger, now_ms);
     taper_bus_guard_update(station, now_ms);
     watch_rival(station, now_ms);
@@ -140,6 +144,11 @@ void taper_station_step(taper_station_t *station, uint32_t now_ms) {
     if (port->kick_watchdog != NULL && taper_self_is_sound(&station->self)) {
         port->kick_watchdog(port->context);
     }
+}
+
+void taper_station_hear(taper_station_t *station, uint32_t now_ms) {
+    listen(station, now_ms);
+    taper_record_update(station, false, now_ms);
 }
 
 void taper_station_poll(taper_station_t *station, uint32_t now_ms) {

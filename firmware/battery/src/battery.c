@@ -18,9 +18,12 @@ int32_t taper_battery_useful_W(const taper_demand_t *demand, uint32_t tick_ms) {
     if (!demand->active || tick_ms == 0) {
         return 0;
     }
-    const int64_t completing_W = divide_up((int64_t)demand->need_Wh * 3600 * 1000, tick_ms);
-    const int32_t offered_W = taper_min_i32(taper_demand_allowed_W(demand), taper_saturate_i32(completing_W));
-    return taper_min_i32(offered_W, taper_battery_limit_W(demand));
+    const int32_t most_W = taper_min_i32(taper_demand_allowed_W(demand), taper_battery_limit_W(demand));
+    const int64_t need_mWs = (int64_t)demand->need_Wh * 3600 * 1000;
+    if ((int64_t)most_W * tick_ms <= need_mWs) {
+        return most_W; /* it is not complete by then; 64 bits are divided slowly */
+    }
+    return taper_saturate_i32(divide_up(need_mWs, tick_ms));
 }
 
 taper_real_t taper_battery_slope_per_h(const taper_demand_t *demand) {

@@ -7,16 +7,14 @@
 
 #define KINDS 32u
 
-/* Which nodes a function may carry in its identifier. */
-typedef enum {
-    NODE_CONNECTOR,
-    NODE_GATEWAY,
-    NODE_CONTROLLER,
-    NODE_ANY, /* that speaks on the bus by itself: all of these */
-} node_class_t;
+/* Which nodes a function may carry in its identifier; bits. */
+#define NODE_CONNECTOR  1u
+#define NODE_GATEWAY    2u
+#define NODE_CONTROLLER 4u
+#define NODE_ANY        7u /* that speaks on the bus by itself: all of these */
 
 typedef struct {
-    node_class_t node;
+    uint8_t nodes;
     void (*decode)(const uint8_t *data, taper_message_t *message, taper_decoding_t *decoding);
     bool (*encode)(const taper_message_t *message, uint8_t *data);
 } route_t;
@@ -42,20 +40,17 @@ static const route_t routes[KINDS] = {
     [TAPER_MESSAGE_EV_PARAM_D] = {NODE_CONNECTOR, taper_decode_ev_param_d, taper_encode_ev_param_d},
 };
 
-static bool node_allowed(node_class_t node_class, unsigned node) {
-    switch (node_class) {
-    case NODE_CONNECTOR: return node >= 1 && node <= TAPER_NODES_PER_BUS;
-    case NODE_ANY: return node <= TAPER_NODES_PER_BUS || node == TAPER_NODE_GATEWAY;
-    case NODE_GATEWAY: return node == TAPER_NODE_GATEWAY;
-    case NODE_CONTROLLER: return node == TAPER_NODE_CONTROLLER;
+/* The bit of a node, 0 for one that nobody has. */
+static unsigned bit_of(unsigned node) {
+    if (node >= 1 && node <= TAPER_NODES_PER_BUS) {
+        return NODE_CONNECTOR;
     }
-    return false;
+    return node == TAPER_NODE_GATEWAY ? NODE_GATEWAY : node == TAPER_NODE_CONTROLLER ? NODE_CONTROLLER : 0u;
 }
 
 /* NULL for a kind that is not decoded here, or a node that it does not allow. */
 static const route_t *find_route(unsigned kind, unsigned node) {
-    const route_t *route = kind < KINDS ? &routes[kind] : NULL;
-    return route != NULL && route->decode != NULL && node_allowed(route->node, node) ? route : NULL;
+    return kind < KINDS && (routes[kind].nodes & bit_of(node)) != 0u ? &routes[kind] : NULL;
 }
 
 bool taper_decode(const taper_frame_t *frame, taper_message_t *message, bool *bad_field) {

@@ -1,24 +1,5 @@
 #include "codec_internal.h"
 
-#include "taper/types.h"
-
-void taper_decoding_refuse(taper_decoding_t *decoding) {
-    decoding->bad_field = true;
-    decoding->refused = true;
-}
-
-int32_t taper_field_decode(const taper_field_t *field, int32_t raw, taper_decoding_t *decoding) {
-    if (raw >= field->low && raw <= field->high) {
-        return raw * field->step;
-    }
-    if (field->absent == TAPER_FIELD_ALWAYS) {
-        taper_decoding_refuse(decoding);
-    } else if (raw != field->absent) {
-        decoding->bad_field = true;
-    }
-    return TAPER_ABSENT;
-}
-
 /* C divides towards zero; "down" must hold for negative limits too. */
 static int32_t divide_down(int32_t value, int32_t step) {
     const int32_t quotient = value / step;

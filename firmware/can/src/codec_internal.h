@@ -7,6 +7,7 @@
 
 #include "taper/frame.h"
 #include "taper/message.h"
+#include "taper/types.h"
 
 typedef enum {
     TAPER_ROUND_DOWN,
@@ -34,14 +35,31 @@ typedef struct {
     bool refused;   /**< one that has no code for "absent": the frame cannot be used */
 } taper_decoding_t;
 
-/** @return the field in its unit, or TAPER_ABSENT; anything out of range is noted in `decoding`. */
-int32_t taper_field_decode(const taper_field_t *field, int32_t raw, taper_decoding_t *decoding);
+/** Refuse a frame: what it says in some field nobody may guess. */
+static inline void taper_decoding_refuse(taper_decoding_t *decoding) {
+    decoding->bad_field = true;
+    decoding->refused = true;
+}
+
+/**
+ * @return the field in its unit, or TAPER_ABSENT; anything out of range is noted in `decoding`. In the header, since fields are
+ * constants that leave little of it to do.
+ */
+static inline int32_t taper_field_decode(const taper_field_t *field, int32_t raw,
+                                         taper_decoding_t *decoding) {
+    if (raw >= field->low && raw <= field->high) {
+        return raw * field->step;
+    }
+    if (field->absent == TAPER_FIELD_ALWAYS) {
+        taper_decoding_refuse(decoding);
+    } else if (raw != field->absent) {
+        decoding->bad_field = true;
+    }
+    return TAPER_ABSENT;
+}
 
 /** @return the raw value for the wire: rounded, moved to the nearest end of the range, or the absent code. */
 int32_t taper_field_encode(const taper_field_t *field, int32_t value);
-
-/** Refuse a frame with an enumeration that the DBC does not name: nobody may guess what it means. */
-void taper_decoding_refuse(taper_decoding_t *decoding);
 
 void taper_decode_site_limit(const uint8_t *data, taper_message_t *message, taper_decoding_t *decoding);
 void taper_decode_setpoint(const uint8_t *data, taper_message_t *message, taper_decoding_t *decoding);

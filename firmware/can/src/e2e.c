@@ -9,6 +9,8 @@
 #define WINDOW_MASK       0x1Fu /* five frames */
 #define WINDOW_MAX_ERRORS 2u
 
+_Static_assert(CRC_OFFSET == 0 && TAPER_FRAME_LENGTH == 8, "the CRC is over bytes 1 to 7");
+
 /* Remainder of every byte by x^8 + x^5 + x^3 + x^2 + x + 1 (0x2F), most significant bit first. */
 static const uint8_t crc_table[256] = {
     0x00, 0x2f, 0x5e, 0x71, 0xbc, 0x93, 0xe2, 0xcd, 0x57, 0x78, 0x09, 0x26, 0xeb, 0xc4, 0xb5, 0x9a,
@@ -33,15 +35,12 @@ static uint8_t crc_step(uint8_t crc, uint8_t byte) {
     return crc_table[crc ^ byte];
 }
 
-static uint8_t crc_run(uint8_t crc, const uint8_t *data, size_t length) {
+uint8_t taper_crc8_8h2f(const uint8_t *data, size_t length) {
+    uint8_t crc = CRC_INITIAL;
     for (size_t i = 0; i < length; i++) {
         crc = crc_step(crc, data[i]);
     }
-    return crc;
-}
-
-uint8_t taper_crc8_8h2f(const uint8_t *data, size_t length) {
-    return crc_run(CRC_INITIAL, data, length) ^ CRC_FINAL_XOR;
+    return crc ^ CRC_FINAL_XOR;
 }
 
 uint8_t taper_e2e_data_id(uint16_t id, uint8_t counter) {
@@ -60,8 +59,14 @@ static uint8_t frame_counter(const taper_frame_t *frame) {
 }
 
 static uint8_t frame_crc(const taper_frame_t *frame) {
-    const uint8_t crc =
-        crc_run(CRC_INITIAL, &frame->data[COUNTER_OFFSET], TAPER_FRAME_LENGTH - COUNTER_OFFSET);
+    const uint8_t *data = frame->data;
+    uint8_t crc = crc_step(CRC_INITIAL, data[1]); /* no loop: this is done for every frame */
+    crc = crc_step(crc, data[2]);
+    crc = crc_step(crc, data[3]);
+    crc = crc_step(crc, data[4]);
+    crc = crc_step(crc, data[5]);
+    crc = crc_step(crc, data[6]);
+    crc = crc_step(crc, data[7]);
     return crc_step(crc, taper_e2e_data_id(frame->id, frame_counter(frame))) ^ CRC_FINAL_XOR;
 }
 

@@ -90,6 +90,8 @@ static bool make_station(taper_driven_t *driven) {
         options.solver = NULL;
     }
     driven->is_ready = taper_station_init(driven->station, &options) == TAPER_OK;
+    driven->heard_instructions = driven->heard_frames = 0;
+    driven->heard_since_step = driven->heard_worst = 0;
     return driven->is_ready;
 }
 
@@ -139,6 +141,30 @@ static bool step(taper_driven_t *driven, uint32_t now_ms) {
     return works || is_new || planner->slices != slices;
 }
 
+/** Frames of a driven station are taken in as they come. */
+static void hear(taper_driven_t *driven) {
+    const taper_driven_board_t *board = &driven->board;
+    const uint32_t before = taper_station_counter(driven->station, TAPER_COUNTER_FRAMES_RECEIVED);
+    driven->is_hearing = true;
+    if (board->call_begins != NULL) {
+        board->call_begins(board->context);
+    }
+    taper_station_hear(driven->station, driven->now_ms);
+    const uint32_t instructions = board->call_ends != NULL ? board->call_ends(board->context) : 0;
+    const uint32_t frames = taper_station_counter(driven->station, TAPER_COUNTER_FRAMES_RECEIVED) - before;
+    driven->is_hearing = false;
+    driven->heard_frames += frames;
+    driven->heard_instructions += instructions;
+    driven->heard_since_step += instructions;
+    if (driven->heard_since_step > driven->heard_worst) {
+        driven->heard_worst = driven->heard_since_step;
+    }
+}
+
+static uint32_t frame_mean(const taper_driven_t *driven) {
+    return driven->heard_frames == 0 ? 0 : (uint32_t)(driven->heard_instructions / driven->heard_frames);
+}
+
 static uint32_t kicks(const taper_driven_board_t *board) {
     return board->kicks != NULL ? board->kicks(board->context) : 0;
 }
@@ -150,7 +176,10 @@ static void call_station(taper_driven_t *driven, uint8_t kind, uint32_t now_ms, 
         board->call_begins(board->context);
     }
     switch (kind) {
-    case TAPER_DRIVE_STEP: done->planned = step(driven, now_ms); break;
+    case TAPER_DRIVE_STEP:
+        done->planned = step(driven, now_ms);
+        driven->heard_since_step = 0;
+        break;
     case TAPER_DRIVE_POLL: taper_station_poll(driven->station, now_ms); break;
     default: taper_station_stop(driven->station, now_ms); break;
     }
@@ -187,6 +216,8 @@ static uint32_t figure(const taper_driven_t *driven, uint8_t index) {
     case TAPER_DRIVE_BUILT_FOR: return driven->options.config->connector_count;
     case TAPER_DRIVE_NAME: return name_crc(driven->options.config->name);
     case TAPER_DRIVE_HAS_PLANNER: return driven->options.solver != NULL;
+    case TAPER_DRIVE_FRAME_MEAN: return frame_mean(driven);
+    case TAPER_DRIVE_FRAMES_WORST: return driven->heard_worst;
     default: return board->figure != NULL ? board->figure(board->context, (taper_drive_figure_t)index) : 0;
     }
 }
@@ -238,6 +269,9 @@ static bool serve_one(taper_driven_t *driven, uint32_t now_ms) {
     taper_slcan_message_t message;
     taper_slcan_pump(driven->slcan, driven->is_driven ? driven->now_ms : now_ms);
     greet_newcomer(driven);
+    if (driven->is_driven && driven->is_ready && taper_slcan_has_frame(driven->slcan)) {
+        hear(driven);
+    }
     if (!taper_slcan_take_extended(driven->slcan, &message)) {
         return false;
     }

@@ -44,17 +44,23 @@ static bool solver_fits(const taper_solver_t *solver, const taper_horizon_t *hor
            solver->rows == 2 * variables + (OSQPInt)horizon->sum_count * config->steps;
 }
 
-/** Hand the matrices' values over if they changed, by tapers or by what connectors count: that costs a factorisation. */
-static bool load_matrices(taper_planner_t *planner) {
+/** Write the matrices' values, and note whether they changed, by tapers or by what connectors count. @return they fit. */
+static bool write_matrices(taper_planner_t *planner) {
     const taper_solver_t *solver = planner->solver;
     const taper_written_t hessian = taper_write_hessian(solver);
     const taper_written_t constraints = taper_write_constraints(solver, &planner->horizon);
-    if (planner->matrix_is_current && !hessian.changed && !constraints.changed) {
-        return true;
+    planner->matrix_is_current = planner->matrix_is_current && !hessian.changed && !constraints.changed;
+    return hessian.count == solver->p_count && constraints.count == solver->a_count;
+}
+
+/** Hand the matrices' values over if they changed: that costs a factorisation. */
+static bool load_matrices(taper_planner_t *planner) {
+    const taper_solver_t *solver = planner->solver;
+    if (!planner->matrix_is_current) {
+        planner->matrix_is_current =
+            osqp_update_data_mat(solver->osqp, solver->p_values, NULL, solver->p_count, solver->a_values,
+                                 NULL, solver->a_count) == 0;
     }
-    planner->matrix_is_current = hessian.count == solver->p_count && constraints.count == solver->a_count &&
-                                 osqp_update_data_mat(solver->osqp, solver->p_values, NULL, solver->p_count,
-                                                      solver->a_values, NULL, solver->a_count) == 0;
     return planner->matrix_is_current;
 }
 
@@ -78,7 +84,7 @@ taper_status_t taper_planner_init(taper_planner_t *planner, const taper_solver_t
         return TAPER_ERR_CONFIG;
     }
     (void)osqp_update_rho(solver->osqp, LEAST_RHO); /* a fresh solver has nothing to factorise yet */
-    if (!load_matrices(planner)) {
+    if (!write_matrices(planner) || !load_matrices(planner)) {
         return TAPER_ERR_CONFIG;
     }
     solver->osqp->settings->eps_abs = ABSOLUTE_TOLERANCE;
@@ -108,7 +114,7 @@ void taper_planner_start(taper_planner_t *planner, const taper_snapshot_t *snaps
     }
     taper_horizon_build(horizon, horizon->config, snapshot, course);
     taper_warm_start(planner, snapshot, shift);
-    planner->verdict = TAPER_VERDICT_SOLVING;
+    planner->verdict = write_matrices(planner) ? TAPER_VERDICT_SOLVING : TAPER_VERDICT_REFUSED;
     planner->iterations = 0;
     planner->slices = 0;
     planner->started_ms = snapshot->now_ms;

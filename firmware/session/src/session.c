@@ -318,11 +318,13 @@ bool taper_session_apply(taper_session_table_t *table, const taper_message_t *me
         apply_time(table, &message->as.time_sync, now_ms);
         return true;
     }
-    const int index = taper_session_connector(table->config, message->bus, message->node);
-    if (index < 0) {
-        return false;
-    }
-    taper_session_t *session = &table->session[index];
+    const int connector = taper_session_connector(table->config, message->bus, message->node);
+    return connector >= 0 && taper_session_apply_to(table, (uint8_t)connector, message, now_ms);
+}
+
+bool taper_session_apply_to(taper_session_table_t *table, uint8_t connector, const taper_message_t *message,
+                            uint32_t now_ms) {
+    taper_session_t *session = &table->session[connector];
     switch (message->kind) {
     case TAPER_MESSAGE_EVSE_STATUS: apply_status(table, session, &message->as.evse_status, now_ms); break;
     case TAPER_MESSAGE_EV_STATUS: apply_ev(table, session, &message->as.ev_status, now_ms); break;

@@ -6,7 +6,7 @@
 /** Three-phase current on a delta side: sqrt(3), rounded up [permille]. */
 #define BALANCED_permille 1733
 
-typedef enum { FAMILY_POWER, FAMILY_LINE, FAMILY_DELTA, FAMILY_DIFFERENCE } family_t;
+typedef enum { FAMILY_POWER, FAMILY_LINE, FAMILY_DELTA, FAMILY_DIFFERENCE, FAMILIES } family_t;
 
 /** Place of a kind in its family: which line (0..2) and which of its two rows. */
 typedef struct {
@@ -198,41 +198,44 @@ taper_booking_t taper_booking_now(const taper_station_config_t *config, const ta
     return booking;
 }
 
-/** List the limits of a kind in place `at`. @return whether some group has one. */
-static bool list_limits(taper_rows_t *rows, const taper_station_config_t *config,
-                        const taper_supply_t *supply, place_t place, unsigned at) {
+static bool some_group_limits(const taper_station_config_t *config, family_t family) {
     bool limited = false;
     for (uint8_t k = 0; k < config->group_count; k++) {
-        rows->limit[k][at] = limit_now_at(config, supply, k, place);
-        limited = limited || rows->limit[k][at] != TAPER_NO_LIMIT;
+        limited = limited || limit_of(&config->groups[k], family) != 0;
     }
     return limited;
 }
 
+/** Add the rows of a kind to the list. */
 static void list_kind(taper_rows_t *rows, const taper_station_config_t *config, const taper_supply_t *supply,
-                      taper_row_kind_t kind) {
-    const place_t place = place_of(kind);
-    const unsigned at = rows->count;
-    if (!list_limits(rows, config, supply, place, at)) {
-        return;
+                      taper_row_kind_t kind, place_t place) {
+    const unsigned row = rows->count++;
+    rows->kind[row] = (uint8_t)kind;
+    rows->sums = kind < TAPER_ROW_SUMS ? rows->count : rows->sums;
+    for (uint8_t k = 0; k < config->group_count; k++) {
+        rows->limit[k][row] = limit_now_at(config, supply, k, place);
     }
     for (uint8_t i = 0; i < config->connector_count; i++) {
-        rows->weight[i][at] = weight_at(&rows->booking[i], place);
+        rows->weight[i][row] = weight_at(&rows->booking[i], place);
     }
-    rows->kind[at] = (uint8_t)kind;
-    rows->count++;
-    rows->sums = kind < TAPER_ROW_SUMS ? rows->count : rows->sums;
 }
 
 void taper_rows_now(taper_rows_t *rows, const taper_station_config_t *config,
                     const taper_snapshot_t *snapshot, const taper_supply_t *supply) {
+    bool limited[FAMILIES];
+    for (int family = 0; family < FAMILIES; family++) {
+        limited[family] = some_group_limits(config, (family_t)family);
+    }
     for (uint8_t i = 0; i < config->connector_count; i++) {
         rows->booking[i] = taper_booking_now(config, snapshot, i);
     }
     rows->count = 0;
     rows->sums = 0;
     for (int kind = 0; kind < TAPER_ROW_KINDS; kind++) {
-        list_kind(rows, config, supply, (taper_row_kind_t)kind);
+        const place_t place = place_of((taper_row_kind_t)kind);
+        if (limited[place.family] && (!place.second || config->line_to_line)) {
+            list_kind(rows, config, supply, (taper_row_kind_t)kind, place);
+        }
     }
 }
 

@@ -97,7 +97,7 @@ static void break_down(twin_t *twin) {
 
 static void call_begins(void *context) {
     twin_t *twin = context;
-    if (twin->fault != NULL && ++twin->calls == twin->fault_call) {
+    if (twin->fault != NULL && !twin->driven.is_hearing && ++twin->calls == twin->fault_call) {
         break_down(twin);
     }
 }

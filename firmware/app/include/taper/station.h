@@ -252,6 +252,14 @@ void taper_station_step(taper_station_t *station, uint32_t now_ms);
 void taper_station_poll(taper_station_t *station, uint32_t now_ms);
 
 /**
+ * Do what can be done ahead of a tick: take in the frames that have come, and write the record of what survives a restart, if
+ * it is due. Nothing is sent. A board that calls it as frames come has them out of the way when the tick is due; the frames that
+ * the station sends are the same. A step and a poll do all of it themselves. Cost: constant for each frame; every 10 s at
+ * most O(connectors).
+ */
+void taper_station_hear(taper_station_t *station, uint32_t now_ms);
+
+/**
  * Going down for good: every connector is told to use its fallback current. Call it two or three times, some 50 ms apart,
  * so that a lost frame does no harm; then do not step the station again.
  */

@@ -26,7 +26,7 @@ typedef struct {
     void (*set_up)(void *context, const taper_drive_setup_t *setup);
     /** It takes the clock again after a reset. @return false: no settings were kept. */
     bool (*resume)(void *context, taper_drive_setup_t *setup);
-    /** Around every step, poll and stop: a watchdog, a count of instructions. @return instructions since the beginning. */
+    /** Around every step, poll and stop, and the taking in of frames: a watchdog, a count of instructions. @return instructions since the beginning. */
     void (*call_begins)(void *context);
     uint32_t (*call_ends)(void *context);
     /** How often the station kicked the watchdog, free-running. */
@@ -48,8 +48,11 @@ typedef struct {
     bool is_driven; /**< somebody else has the clock */
     bool is_ready;  /**< the station took its settings, and may be called */
     uint32_t now_ms;
-    uint16_t slice_iterations; /**< of the last step */
-    taper_drive_setup_t setup; /**< as far as it has come */
+    uint16_t slice_iterations;                 /**< of the last step */
+    bool is_hearing;                           /**< frames are being taken in: no call of the simulation's */
+    uint64_t heard_instructions, heard_frames; /**< since the station was made */
+    uint32_t heard_since_step, heard_worst;    /**< instructions for the frames between two steps */
+    taper_drive_setup_t setup;                 /**< as far as it has come */
     taper_station_config_t config;
     taper_connector_config_t connectors[TAPER_MAX_CONNECTORS];
     taper_policy_t policy;

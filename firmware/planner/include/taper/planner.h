@@ -69,7 +69,7 @@ taper_status_t taper_planner_init(taper_planner_t *planner, const taper_solver_t
 /**
  * State a new problem. The last usable answer, moved on in time, is the starting point; after a problem that was dropped
  * or had no usable answer, the solver starts from nothing. The solver does not know of it before the next slice.
- * `course` as in taper_horizon_build(). Cost: that of taper_horizon_build(), and O(rows).
+ * `course` as in taper_horizon_build(). Cost: that of taper_horizon_build(), and O(entries of the matrices).
  */
 void taper_planner_start(taper_planner_t *planner, const taper_snapshot_t *snapshot,
                          const taper_course_t *course);

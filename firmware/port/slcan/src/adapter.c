@@ -56,6 +56,10 @@ static bool write_out(taper_slcan_t *slcan) {
     return taken > 0;
 }
 
+bool taper_slcan_has_frame(const taper_slcan_t *slcan) {
+    return slcan->receive_head != slcan->receive_tail;
+}
+
 bool taper_slcan_is_drained(const taper_slcan_t *slcan) {
     return slcan->send_head == slcan->send_tail && slcan->out_taken == slcan->out_length;
 }

@@ -129,6 +129,10 @@ void taper_session_init(taper_session_table_t *table, const taper_station_config
  */
 bool taper_session_apply(taper_session_table_t *table, const taper_message_t *message, uint32_t at_ms);
 
+/** The same for a message of connector `connector`, whatever its node. Cost: constant. */
+bool taper_session_apply_to(taper_session_table_t *table, uint8_t connector, const taper_message_t *message,
+                            uint32_t at_ms);
+
 /**
  * Draw the conclusions from what came in: forget reports past their timeout, bring the estimates of stored energy up to
  * date, note in `revision` who starts or stops to want energy (sessions and parameters are noted as they come), and

@@ -3,7 +3,8 @@
  * SLCAN. The station bus has 11-bit identifiers only, so the two never mix. A product has none of this; only the main of the
  * emulated boards obeys it.
  *
- * From SETUP on the board's own clock stands still. Frames count as received at the last TIME; STEP and POLL call
+ * From SETUP on the board's own clock stands still. Frames count as received at the last TIME, and are taken in as they come
+ * (taper_station_hear()); STEP and POLL call
  * taper_station_step() and taper_station_poll(), and are answered by DONE once all that the station sent is on the wire. So a
  * run goes as fast as the emulator, and repeats to the bit.
  *
@@ -56,6 +57,8 @@ typedef enum {
     TAPER_DRIVE_BUILT_FOR,        /**< connectors of the board's station */
     TAPER_DRIVE_NAME,             /**< CRC-32 of the name of the board's station */
     TAPER_DRIVE_HAS_PLANNER,      /**< 1: the image has one */
+    TAPER_DRIVE_FRAME_MEAN, /**< instructions to take in a frame, on average since SETUP or RESUME; 0: not known */
+    TAPER_DRIVE_FRAMES_WORST, /**< most instructions for all frames that came between two steps */
     TAPER_DRIVE_FIGURES
 } taper_drive_figure_t;
 

@@ -119,6 +119,9 @@ bool taper_slcan_take_extended(taper_slcan_t *slcan, taper_slcan_message_t *mess
  */
 void taper_slcan_send_extended(taper_slcan_t *slcan, const taper_slcan_message_t *message);
 
+/** Whether a received frame waits for the station. */
+bool taper_slcan_has_frame(const taper_slcan_t *slcan);
+
 /** Whether all that was to be sent is on the stream. */
 bool taper_slcan_is_drained(const taper_slcan_t *slcan);
 
