@@ -123,18 +123,18 @@ static void test_a_turn_that_is_kept_goes_on_as_much_later(void) {
                                  .owed_mWs = -1234567,
                                  .lacks_mW = 5};
     tree.allocator.turn[1] = before;
-    const taper_turn_kept_t kept = taper_allocator_keep(&tree.allocator, 1, 62999);
+    const taper_turn_kept_t kept = taper_allocator_keep(&tree.allocator, 1, 5002999);
     TEST_ASSERT_TRUE(kept.on && kept.switched && kept.waits);
-    TEST_ASSERT_EQUAL_UINT32(60, kept.since_s);
-    TEST_ASSERT_EQUAL_UINT32(59, kept.waiting_s);
+    TEST_ASSERT_EQUAL_UINT32(5000, kept.since_s);
+    TEST_ASSERT_EQUAL_UINT32(4999, kept.waiting_s);
     TEST_ASSERT_EQUAL_INT32(-1234, kept.owed_Ws);
     taper_allocator_restore(&tree.allocator, 0, 7, &kept, 100, 50000); /* a clock that began anew */
     const taper_turn_t *after = &tree.allocator.turn[0];
     TEST_ASSERT_TRUE(after->on && after->switched);
     TEST_ASSERT_EQUAL_UINT8(7, after->session);
     TEST_ASSERT_EQUAL_UINT8(1, after->place);
-    TEST_ASSERT_EQUAL_UINT32(160000, taper_elapsed_ms(50000, after->since_ms));
-    TEST_ASSERT_EQUAL_UINT32(159000, taper_elapsed_ms(50000, after->waiting_ms));
+    TEST_ASSERT_EQUAL_UINT32(5100000, taper_elapsed_ms(50000, after->since_ms));
+    TEST_ASSERT_EQUAL_UINT32(5099000, taper_elapsed_ms(50000, after->waiting_ms));
     TEST_ASSERT_EQUAL_INT64(-1234000, after->owed_mWs);
     TEST_ASSERT_EQUAL_INT64(0, after->lacks_mW);
 }

@@ -71,6 +71,12 @@ static void test_a_start_is_over_when_nothing_of_an_earlier_life_is_in_force_any
     TEST_ASSERT_TRUE(taper_ledger_is_starting(&ledger));
     bench_wait_ms(1);
     TEST_ASSERT_FALSE(taper_ledger_is_starting(&ledger));
+    const uint8_t count = ledger.config->connector_count;
+    for (uint8_t i = 0; i <= count && i < TAPER_MAX_CONNECTORS; i++) {
+        ledger.entry[i].unknown_mA = 1;
+        TEST_ASSERT_EQUAL(i < count, taper_ledger_is_starting(&ledger)); /* any of them, and nobody else */
+        ledger.entry[i].unknown_mA = 0;
+    }
 }
 
 static void test_after_a_start_two_different_echoes_prove_ours(void) {
