@@ -50,14 +50,20 @@ static bool read_all(int fd, unsigned char *data, uint32_t length) {
 
 bool taper_store_read(const char *path, unsigned area, unsigned copy, void *data, uint32_t length) {
     char file[PATH_MAX];
-    const bool is_there = fits(area, copy, length) && name(file, path, area, copy);
-    const int fd = is_there ? open(file, O_RDONLY | O_CLOEXEC) : -1;
-    if (fd < 0) {
+    if (!fits(area, copy, length) || !name(file, path, area, copy)) {
         return false;
     }
-    const bool good = read_all(fd, data, length);
-    (void)close(fd);
-    return good;
+    const int fd = open(file, O_RDONLY | O_CLOEXEC);
+    if (fd < 0 && errno == ENOENT) {
+        return false;
+    }
+    if (fd < 0 || !read_all(fd, data, length)) {
+        memset(data, 0, length);
+    }
+    if (fd >= 0) {
+        (void)close(fd);
+    }
+    return true;
 }
 
 bool taper_store_write(const char *path, unsigned area, unsigned copy, const void *data, uint32_t length) {

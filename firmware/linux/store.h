@@ -8,7 +8,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/** @return whether the file could be read. Of one that is too short the rest is zero: the station's CRC-32 refuses it. */
+/**
+ * @return false: there is no such file. Of one that is too short the rest is zero, of one that cannot be read all of it: the
+ * station's CRC-32 refuses that.
+ */
 bool taper_store_read(const char *path, unsigned area, unsigned copy, void *data, uint32_t length);
 
 /** Write a new file, to the disk, then rename it. @return false, with errno: the copy is as it was. Blocks for the disk. */

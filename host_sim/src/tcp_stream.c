@@ -34,10 +34,22 @@ static bool split(const char *address, char host[256], char port[16]) {
 }
 
 /** @return file descriptor; -1: errno. */
+/** Where nobody listens on a port of ours, a connection can find itself, and would keep the port from who is to have it. */
+static bool is_to_itself(int fd) {
+    struct sockaddr_storage here = {0};
+    struct sockaddr_storage there = {0};
+    socklen_t here_B = sizeof here;
+    socklen_t there_B = sizeof there;
+    return getsockname(fd, (struct sockaddr *)&here, &here_B) == 0 &&
+           getpeername(fd, (struct sockaddr *)&there, &there_B) == 0 && here_B == there_B &&
+           memcmp(&here, &there, here_B) == 0;
+}
+
 static int connect_to(const struct addrinfo *place) {
     const int fd = socket(place->ai_family, place->ai_socktype, place->ai_protocol);
-    if (fd >= 0 && connect(fd, place->ai_addr, place->ai_addrlen) != 0) {
-        const int error = errno;
+    const bool failed = fd >= 0 && connect(fd, place->ai_addr, place->ai_addrlen) != 0;
+    if (failed || (fd >= 0 && is_to_itself(fd))) {
+        const int error = failed ? errno : ECONNREFUSED;
         close(fd);
         errno = error;
         return -1;

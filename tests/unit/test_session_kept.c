@@ -215,6 +215,21 @@ static void test_the_taper_of_another_vehicle_is_not_used(void) {
     TEST_ASSERT_EQUAL_INT32(4400, bench_demand(&bench)->taper_W);
 }
 
+static void test_the_taper_that_tells_of_another_session_is_that_sessions(void) {
+    restart();
+    bench.a.session = SESSION + 1;
+    bench.b.session = SESSION + 1;
+    bench.d.session = SESSION + 1;
+    bench.elec.energy_Wh = 0;
+    bench_report_status(&bench);
+    bench_report_ev(&bench);
+    bench_report_d(&bench);
+    bench_report_a(&bench);
+    bench_report_b(&bench);
+    bench_report_c(&bench);
+    TEST_ASSERT_EQUAL_INT32(4400, bench_demand(&bench)->taper_W);
+}
+
 static void test_a_vehicle_that_left_meanwhile_is_forgotten(void) {
     restart();
     bench_unplug(&bench);
@@ -381,6 +396,7 @@ int main(void) {
     RUN_TEST(test_what_was_not_told_before_contradicts_nothing);
     RUN_TEST(test_a_meter_that_shows_less_is_another_session);
     RUN_TEST(test_the_taper_of_another_vehicle_is_not_used);
+    RUN_TEST(test_the_taper_that_tells_of_another_session_is_that_sessions);
     RUN_TEST(test_a_vehicle_that_left_meanwhile_is_forgotten);
     RUN_TEST(test_who_was_done_and_fell_asleep_stays_done);
     RUN_TEST(test_the_restart_itself_counts_once_the_clock_is_set);

@@ -86,6 +86,7 @@ static uint32_t receive_overflows(void *context) {
  * sequence number and CRC-32, so a write that power-off cuts short may leave that copy torn; it must not harm another.
  * The station writes its own area at most every ten seconds, and every 15 minutes while vehicles charge; settings are
  * written by hand. Flash that bears few erasures is erased only when a sector is full: append, and read the last one.
+ * False from a read says that the copy was never written. One that cannot be read answers true, with zeros.
  */
 static bool store_read(void *context, unsigned area, unsigned copy, void *data, uint32_t length) {
     taper_template_board_t *board = context;

@@ -251,6 +251,8 @@ static void apply_parameters(taper_session_table_t *table, taper_session_t *sess
     session->param_seen = (uint8_t)(session->param_seen | part);
     if (session->awaited && part != PARAM_C && session_of(message) != session->used.a.session) {
         taper_session_drop(table, session, now_ms);
+        session->param_seen =
+            (uint8_t)(session->param_seen | part); /* this one is of the session that is there */
     }
     use_parameters(table, session, now_ms);
 }

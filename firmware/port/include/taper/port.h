@@ -56,7 +56,10 @@ typedef struct {
      * Read the first `length` bytes of a copy (0..TAPER_STORE_COPIES-1) of an area's record (taper_store_area_t) in
      * non-volatile memory, or write it, from its first byte on; 1..TAPER_STORE_RECORD_MAX. A read may be longer or shorter
      * than what was written: what lies beyond is of no account. A write that power-off cuts short may leave that copy
-     * torn, and no other of any area. @return false: it could not be done, or was never written. Both NULL: no store.
+     * torn, and no other of any area. Both NULL: no store.
+     * @return of a read, false: this copy was never written. What was written and cannot be read must not look like that, or a
+     * limit that was set at the site would be forgotten: answer true, with zeros, which are no record. Of a write, false: it
+     * could not be done.
      */
     bool (*store_read)(void *context, unsigned area, unsigned copy, void *data, uint32_t length);
     bool (*store_write)(void *context, unsigned area, unsigned copy, const void *data, uint32_t length);
