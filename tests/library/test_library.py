@@ -203,7 +203,7 @@ def microcontroller(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def is_a_firmware_for_arm(program: Path) -> bool:
     symbols = run(f"arm-none-eabi-nm {program}").split()
-    return {"main", "taper_station_step", "taper_osqp_solve"} <= set(symbols)
+    return {"main", "taper_station_step", "taper_osqp_update_data_mat"} <= set(symbols)
 
 
 def test_add_subdirectory_links_a_firmware_for_a_microcontroller(microcontroller: Path) -> None:
