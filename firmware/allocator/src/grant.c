@@ -16,8 +16,8 @@ typedef struct {
  * is overdrawn by leaves it no room either: the current would rise, though no row did.
  */
 static void share_excess(taper_rooms_t *rooms, const taper_rows_t *rows, uint8_t group_count) {
-    for (unsigned row = 0; row + 3u < rows->sums; row++) { /* the second one is three places behind */
-        const bool has_two = rows->kind[row] >= TAPER_ROW_DELTA_L1 && rows->kind[row] <= TAPER_ROW_DELTA_L3;
+    for (unsigned row = 0; row + 3u < rows->sums; row++) { /* the second ones are the last three */
+        const bool has_two = rows->kind[row] >= TAPER_ROW_DELTA_L1;
         for (uint8_t k = 0; has_two && k < group_count; k++) {
             int64_t *left = rooms->left[k];
             const int64_t least = left[row] < left[row + 3u] ? left[row] : left[row + 3u];
