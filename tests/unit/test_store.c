@@ -51,7 +51,7 @@ static void test_a_file_that_is_too_short_ends_in_zeros(void) {
     assert_zero_from(3);
 }
 
-static void test_row_30_what_cannot_be_read_was_not_never_written(void) {
+static void test_what_cannot_be_read_does_not_pass_for_never_written(void) {
     char file[80];
     snprintf(file, sizeof file, "%s.settings.0", path);
     TEST_ASSERT_EQUAL_INT(0, mkdir(file, 0700)); /* reading a folder fails, for root too */
@@ -69,7 +69,7 @@ int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_what_was_never_written_says_so);
     RUN_TEST(test_a_file_that_is_too_short_ends_in_zeros);
-    RUN_TEST(test_row_30_what_cannot_be_read_was_not_never_written);
+    RUN_TEST(test_what_cannot_be_read_does_not_pass_for_never_written);
     RUN_TEST(test_what_no_store_has_is_refused);
     return UNITY_END();
 }
