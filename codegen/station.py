@@ -12,14 +12,19 @@ from station_model import (
     MAX_CHANGE_s,
     MAX_CURRENT_dA,
     MAX_LIMIT_mA,
+    MAX_LAMBDA_per_kWh2,
     MAX_LIMIT_W,
+    MAX_OUTER_ITERATIONS,
     MAX_STEPS,
     MAX_SWITCH_s,
     MAX_TICK_ms,
     MAX_VOLTAGE_mV,
     MIN_SITE_VOLTAGE_mV,
+    OBJECTIVES,
+    REPLANS,
     Connector,
     Group,
+    Planning,
     Station,
 )
 from toml_table import Table, load
@@ -39,7 +44,7 @@ def read_station(path: Path, shown: str | None = None) -> Station:
     root = load(path, shown or str(path))
     fields = _names(root, path.stem) | _horizon(root.table("horizon")) | _control(root.table("control"))
     if root.has("planning"):
-        fields |= _planning(root.table("planning"))
+        fields |= _planning(root.table("planning"), fields["steps"])
     site = root.table("site")
     fields |= _site(site)
     groups = read_groups(root, fields["site_voltage_mV"] if site.has("voltage_V") else None)
@@ -95,10 +100,36 @@ def _control(table: Table) -> Fields:
     return fields
 
 
-def _planning(table: Table) -> Fields:
-    fields = {"price_weight_permille": table.quantity("price_weight", 0, 1000, per_unit=1000, default=0)}
+def _planning(table: Table, steps: int) -> Fields:
+    planning = Planning(
+        objective=_one_of(table, "objective", OBJECTIVES),
+        horizon_steps=table.integer("horizon_steps", 2, steps) if table.has("horizon_steps") else 0,
+        outer_iterations=_outer_iterations(table),
+        on_events=_one_of(table, "replan", REPLANS) == "events",
+        learns_taper=table.boolean("learn_taper", False),
+        lambda_milli_per_kWh2=table.quantity("lambda_per_kWh2", 0, MAX_LAMBDA_per_kWh2 * 1000, per_unit=1000, default=0),
+    )
+    if planning.objective == "log-utility" and not table.has("lambda_per_kWh2"):
+        raise table.error("lambda_per_kWh2", "missing; the log utility needs it")
+    fields = {
+        "price_weight_permille": table.quantity("price_weight", 0, 1000, per_unit=1000, default=0),
+        "planning": planning,
+    }
     table.end()
     return fields
+
+
+def _one_of(table: Table, key: str, names: tuple[str, ...]) -> str:
+    """The first one is the default."""
+    name = table.string(key, names[0])
+    if name not in names:
+        raise table.error(key, f'"{name}" is not one of {", ".join(names)}')
+    return name
+
+
+def _outer_iterations(table: Table) -> int:
+    key = "outer_iterations"
+    return table.integer(key, 1, MAX_OUTER_ITERATIONS) if table.has(key) else 0
 
 
 def _site(table: Table) -> Fields:

@@ -25,6 +25,12 @@ MAX_CHANGE_s = 600
 MAX_TICK_ms = 60_000
 MAX_REACTION_ms = 60_000
 
+MAX_OUTER_ITERATIONS = 20
+MAX_LAMBDA_per_kWh2 = 10_000
+
+OBJECTIVES = ("throughput", "log-utility")  # taper_objective_t
+REPLANS = ("steps", "events")  # once a step and at every event, or at events only
+
 # Supply phases of a connector's conductors L1, L2, L3, or of its first one or two: taper_rotation_t by name.
 ROTATIONS = ("123", "231", "312", "132", "213", "321")
 STRAIGHT = "123"
@@ -71,6 +77,18 @@ class Connector:
 
 
 @dataclass(frozen=True)
+class Planning:
+    """How the planner plans (taper_planning_t)."""
+
+    objective: str = "throughput"  # of OBJECTIVES
+    horizon_steps: int = 0  # 0: all
+    outer_iterations: int = 0  # of the log utility; 0: the firmware's default
+    on_events: bool = False
+    learns_taper: bool = False
+    lambda_milli_per_kWh2: int = 0
+
+
+@dataclass(frozen=True)
 class Station:
     """The site is group 0, and a parent stands before its children."""
 
@@ -92,6 +110,7 @@ class Station:
     ramp_mA_per_s: int = 0
     deadband_mA: int = 0
     price_weight_permille: int = 0
+    planning: Planning = Planning()
 
     @property
     def line_to_line(self) -> bool:

@@ -2,6 +2,7 @@
 
 from rows import planned_rows
 from station import Connector, Group, Station
+from station_model import Planning
 
 
 def sizes_header(stations: list[Station], real: str) -> str:
@@ -93,6 +94,7 @@ const taper_station_config_t taper_station_{name} = {{
     .ramp_mA_per_s = {station.ramp_mA_per_s},
     .deadband_mA = {station.deadband_mA},
     .price_weight_permille = {station.price_weight_permille},
+    .planning = {_planning(station.planning)},
     .line_to_line = {_bool(station.line_to_line)},
     .step_s = {station.step_s},
     .steps = {station.steps},
@@ -100,6 +102,18 @@ const taper_station_config_t taper_station_{name} = {{
     .group_count = {len(station.groups)},
 }};
 """
+
+
+def _planning(planning: Planning) -> str:
+    fields = {
+        "objective": f"TAPER_OBJECTIVE_{planning.objective.upper().replace('-', '_')}",
+        "horizon_steps": planning.horizon_steps,
+        "outer_iterations": planning.outer_iterations,
+        "on_events": _bool(planning.on_events),
+        "learns_taper": _bool(planning.learns_taper),
+        "lambda_milli_per_kWh2": planning.lambda_milli_per_kWh2,
+    }
+    return _initializer(fields)[:-1]
 
 
 def _group(group: Group) -> str:

@@ -14,6 +14,7 @@ typedef struct {
     /** NULL: the planner. Else called with a pointer to the tick in ms (uint32_t) as its context. */
     void (*propose)(void *tick_ms, const taper_snapshot_t *snapshot, int32_t site_limit_W,
                     taper_proposal_t *proposal);
+    taper_objective_t objective; /**< of the planner */
     int on_board; /**< taper_drive_policy_t; negative: only this program has it */
 } sim_policy_t;
 

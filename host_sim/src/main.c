@@ -18,11 +18,35 @@
 #include "taper/stations.h"
 #include "world.h"
 
+/** Of the log utility, where neither the station nor an option says it [1/1000 kWh2]. */
+#define DEFAULT_LAMBDA_milli 100000
+
 /** A station as the options want it, and what is borrowed by it. */
 typedef struct {
     taper_station_config_t config;
     taper_connector_config_t *connectors;
 } station_copy_t;
+
+/** How the planner plans: as the station says, but for what the options and the policy say. */
+static taper_planning_t planning_of(const sim_options_t *options, const taper_planning_t *own) {
+    taper_planning_t planning = *own;
+    planning.objective = (uint8_t)options->policy->objective;
+    if (options->horizon_steps > 0) {
+        planning.horizon_steps = (uint8_t)options->horizon_steps;
+    }
+    if (options->outer_iterations > 0) {
+        planning.outer_iterations = (uint8_t)options->outer_iterations;
+    }
+    if (options->replan_given) {
+        planning.on_events = options->on_events;
+    }
+    if (options->lambda >= 0.0) {
+        planning.lambda_milli_per_kWh2 = (int32_t)lround(options->lambda * 1000.0);
+    } else if (planning.lambda_milli_per_kWh2 == 0) {
+        planning.lambda_milli_per_kWh2 = DEFAULT_LAMBDA_milli;
+    }
+    return planning;
+}
 
 static station_copy_t copy_station(const sim_options_t *options) {
     const taper_station_config_t *original = taper_stations[options->station];
@@ -35,6 +59,7 @@ static station_copy_t copy_station(const sim_options_t *options) {
         }
     }
     copy.config.connectors = copy.connectors;
+    copy.config.planning = planning_of(options, &original->planning);
     copy.config.tick_ms = options->tick_s * 1000U;
     if (options->price_weight >= 0.0) {
         copy.config.price_weight_permille = (int32_t)lround(options->price_weight * 1000.0);

@@ -10,7 +10,9 @@
 #include "arguments.h"
 #include "taper/stations.h"
 
-#define LONGEST_TICK_S  3600
+#define LONGEST_TICK_S 3600
+/** The firmware takes no greater one. */
+#define MOST_LAMBDA     10000
 #define DEFAULT_STATION "garage"
 /** A whole solve of the largest station takes an emulator on a busy machine some seconds. */
 #define BUS_TIMEOUT_S     60
@@ -68,6 +70,10 @@ enum {
     KEY_LIMIT_CSV,
     KEY_PRICE_CSV,
     KEY_PRICE_WEIGHT,
+    KEY_LAMBDA,
+    KEY_OUTER_ITERATIONS,
+    KEY_HORIZON,
+    KEY_REPLAN,
     KEY_TICK,
     KEY_MINIMUM,
     KEY_SEED,
@@ -95,6 +101,18 @@ static const struct argp_option options[] = {
      0},
     {"price-weight", KEY_PRICE_WEIGHT, "W", 0,
      "Weight of the price against having energy early, 0..1 (default: the station's own)", 0},
+    {"lambda", KEY_LAMBDA, "X", 0,
+     "Policies by log utility: weight of the squared energy missing at departure [1/kWh2] (default: the "
+     "station's own, or 100)",
+     0},
+    {"outer-iterations", KEY_OUTER_ITERATIONS, "N", 0,
+     "The same: quadratic programmes per plan, 1..20 (default: the station's own, or 6)", 0},
+    {"horizon-steps", KEY_HORIZON, "N", 0,
+     "Steps that are planned, 2.. those of the station (default: the station's own, or all)", 0},
+    {"replan", KEY_REPLAN, "WHEN", 0,
+     "steps: plan once a step and at every event; events: only when a vehicle comes, leaves or reaches its "
+     "target, or a limit changes, as in the paper (default: the station's own, or steps)",
+     0},
     {"tick-s", KEY_TICK, "N", 0, "Control tick [s], 1..3600 (default: 60)", 0},
     {"iterations", KEY_ITERATIONS, "N", 0,
      "Solver iterations in a tick, 1..500; fewer than 10 bound its work (default: 500 in ticks of 10 s or "
@@ -167,6 +185,14 @@ static void set_price_weight(sim_options_t *chosen, const char *text, struct arg
     }
 }
 
+static void set_replan(sim_options_t *chosen, const char *text, struct argp_state *state) {
+    chosen->replan_given = true;
+    chosen->on_events = strcmp(text, "events") == 0;
+    if (!chosen->on_events && strcmp(text, "steps") != 0) {
+        argp_error(state, "--replan: neither steps nor events: '%s'", text);
+    }
+}
+
 /** The name of an option. */
 static const char *name_of(int key) {
     const struct argp_option *option = options;
@@ -204,6 +230,10 @@ static void check_bus(const sim_options_t *chosen, struct argp_state *state) {
     if (chosen->policy->on_board < 0) {
         argp_error(state, "--policy %s: a board (--bus) does not have it", chosen->policy->name);
     }
+    if (chosen->lambda >= 0.0 || chosen->outer_iterations > 0 || chosen->horizon_steps > 0 ||
+        chosen->replan_given) {
+        argp_error(state, "--bus: how a board plans is in its own description of the station");
+    }
     if (taper_setup_buses(station) > 1) {
         argp_error(state, "--bus: station %s has %u CAN buses, and SLCAN carries one", station->name,
                    taper_setup_buses(station));
@@ -232,6 +262,10 @@ static void check_run(const sim_options_t *chosen, struct argp_state *state) {
     if (chosen->min_current_A > most_A) {
         argp_error(state, "--min-current-a: above %g A, the most that a connector of this station gives",
                    most_A);
+    }
+    if (chosen->horizon_steps > taper_stations[chosen->station]->steps) {
+        argp_error(state, "--horizon-steps: station %s has %u", taper_stations[chosen->station]->name,
+                   (unsigned)taper_stations[chosen->station]->steps);
     }
     if (chosen->bus != NULL) {
         check_bus(chosen, state);
@@ -295,6 +329,28 @@ static bool parse_replay(int key, const char *text, sim_replay_options_t *replay
     return true;
 }
 
+/** The options of how the planner plans. @return whether `key` is one. */
+static bool parse_planning(int key, const char *text, sim_options_t *chosen, struct argp_state *state) {
+    switch (key) {
+    case KEY_PRICE_WEIGHT: set_price_weight(chosen, text, state); break;
+    case KEY_LAMBDA:
+        chosen->lambda = taper_argument_not_negative("--lambda", text, state);
+        if (chosen->lambda > MOST_LAMBDA) {
+            argp_error(state, "--lambda: above %d: '%s'", MOST_LAMBDA, text);
+        }
+        break;
+    case KEY_OUTER_ITERATIONS:
+        chosen->outer_iterations = whole("--outer-iterations", text, 1, TAPER_MAX_OUTER_ITERATIONS, state);
+        break;
+    case KEY_HORIZON:
+        chosen->horizon_steps = whole("--horizon-steps", text, 2, TAPER_MAX_STEPS, state);
+        break;
+    case KEY_REPLAN: set_replan(chosen, text, state); break;
+    default: return false;
+    }
+    return true;
+}
+
 /** The options of --bus, of what goes beside the results, and --iterations. @return whether `key` is one. */
 static bool parse_bus(int key, const char *text, sim_options_t *chosen, struct argp_state *state) {
     switch (key) {
@@ -322,7 +378,6 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     case KEY_LIMIT: chosen->limit_kw = taper_argument_not_negative("--limit-kw", text, state); break;
     case KEY_LIMIT_CSV: chosen->limit_file = text; break;
     case KEY_PRICE_CSV: chosen->price_file = text; break;
-    case KEY_PRICE_WEIGHT: set_price_weight(chosen, text, state); break;
     case KEY_TICK:
         chosen->tick_s = (uint32_t)taper_argument_whole("--tick-s", text, 1, LONGEST_TICK_S, state);
         break;
@@ -334,7 +389,8 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     case ARGP_KEY_ARG: argp_error(state, "unexpected argument '%s'", text); break;
     case ARGP_KEY_END: check(chosen, state); break;
     default:
-        return parse_bus(key, text, chosen, state) || parse_replay(key, text, &chosen->replay, state)
+        return parse_bus(key, text, chosen, state) || parse_planning(key, text, chosen, state) ||
+                       parse_replay(key, text, &chosen->replay, state)
                    ? 0
                    : ARGP_ERR_UNKNOWN;
     }
@@ -355,6 +411,7 @@ sim_options_t sim_options_parse(int argc, char **argv) {
     sim_options_t chosen = {.limit_kw = -1.0,
                             .min_current_A = -1.0,
                             .price_weight = -1.0,
+                            .lambda = -1.0,
                             .tick_s = 60,
                             .replay.setup = taper_setup_default(0)};
     chosen.replay.setup.time_scale = 0; // not given

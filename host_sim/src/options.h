@@ -25,6 +25,10 @@ typedef struct {
     double limit_kw;      /**< negative: not given */
     double min_current_A; /**< negative: the station's own */
     double price_weight;  /**< 0..1; negative: the station's own */
+    double lambda;                /**< of the log utility [1/kWh2]; negative: the station's own */
+    unsigned outer_iterations;    /**< of the log utility; 0: the station's own */
+    unsigned horizon_steps;       /**< 0: the station's own */
+    bool replan_given, on_events; /**< the paper's rule of planning anew */
     uint32_t tick_s;
     uint16_t iterations; /**< of the solver in a tick; 0: as the tick has room */
     uint64_t seed;

@@ -1,7 +1,10 @@
 #include "problems.h"
 
 void sim_problems_begin(FILE *file, const taper_station_t *station) {
-    fprintf(file, "station %s\n", station->options.config->name);
+    const taper_planning_t *planning = &station->options.config->planning;
+    fprintf(file, "station %s\nplanning %u %ld %u %u\n", station->options.config->name,
+            (unsigned)planning->objective, (long)planning->lambda_milli_per_kWh2,
+            (unsigned)planning->outer_iterations, (unsigned)planning->horizon_steps);
 }
 
 void sim_problems_add(FILE *file, const taper_station_t *station) {

@@ -17,6 +17,12 @@ ramp_A_per_s = 1.5
 deadband_A = 0.3
 [planning]
 price_weight = 0.25
+objective = "log-utility"
+lambda_per_kWh2 = 12.5
+outer_iterations = 4
+horizon_steps = 3
+replan = "events"
+learn_taper = true
 [site]
 failsafe_kW = 20.0
 other_load_kW = 40.0

@@ -36,7 +36,7 @@ def line(*values: object) -> str:
 def expected(station: dict) -> list[str]:
     """The same lines straight from the TOML, for a file whose groups are in the right order already."""
     names = [group["name"] for group in station["groups"]]
-    lines = [expected_station(station)]
+    lines = [expected_station(station), expected_planning(station.get("planning", {}))]
     for group in station["groups"]:
         parent = names.index(group["parent"]) if "parent" in group else 255
         volts = station["site"].get("voltage_V", 230)
@@ -63,6 +63,13 @@ def expected_station(station: dict) -> str:
     horizon = station["horizon"]["step_s"], station["horizon"]["steps"]
     failsafe_W = thousandths(site, "failsafe_kW")
     return line(station["name"], failsafe_W, *load, *times, *movement, price, between, *horizon)
+
+
+def expected_planning(planning: dict) -> str:
+    objective = ("throughput", "log-utility").index(planning.get("objective", "throughput"))
+    counts = planning.get("horizon_steps", 0), planning.get("outer_iterations", 0)
+    switches = planning.get("replan") == "events", planning.get("learn_taper", False)
+    return line("planning", objective, *counts, *switches, thousandths(planning, "lambda_per_kWh2"))
 
 
 def expected_connector(run: dict) -> tuple[int, ...]:

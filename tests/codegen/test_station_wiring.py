@@ -33,6 +33,12 @@ MISTAKES = {
         "must be 0 to 1, not 2",
     ),
     "unknown key of planning": ("price_weight = 0.25", "prices = 1", "planning.prices", "unknown key"),
+    "unknown objective": ('"log-utility"', '"energy"', "planning.objective", '"energy" is not one of throughput, log-utility'),
+    "log utility without its weight": ("lambda_per_kWh2 = 12.5", "", "planning.lambda_per_kWh2", "missing"),
+    "lambda of a finer step": ("12.5", "12.5001", "planning.lambda_per_kWh2", "must be a multiple of 0.001"),
+    "no outer iteration": ("outer_iterations = 4", "outer_iterations = 0", "planning.outer_iterations", "must be 1 to 20"),
+    "horizon beyond the steps": ("horizon_steps = 3", "horizon_steps = 5", "planning.horizon_steps", "must be 2 to 4, not 5"),
+    "unknown rule of planning anew": ('"events"', '"always"', "planning.replan", '"always" is not one of steps, events'),
     "planning is a value": ("[planning]", "planning = 1\n[other]", "control.planning", "unknown key"),
     "failsafe above the site": (
         "failsafe_kW = 20.0",

@@ -3,6 +3,8 @@
  * writes what it reads:
  *
  *     station NAME                starts cold
+ *     planning OBJECTIVE LAMBDA_milli_per_kWh2 OUTER_ITERATIONS HORIZON_STEPS
+ *                                 as in taper_planning_t, starts cold; as described if not given
  *     time MS                     of the snapshot; 0 if not given
  *     limit W0 .. W(T-1)
  *     phases mA mA mA             what other load leaves on each; as described if not given
@@ -28,11 +30,32 @@
 static taper_planner_t planner;
 static taper_snapshot_t snapshot;
 static taper_course_t course;
-static const taper_station_config_t *config;
+static taper_station_config_t chosen;
+static const taper_station_config_t *const config = &chosen;
+static const taper_solver_t *solver;
 
 static void fail(const char *line) {
     fprintf(stderr, "planner_probe: cannot use: %s", line);
     exit(1);
+}
+
+static void start_cold(const char *line) {
+    if (solver == NULL || taper_planner_init(&planner, solver, config) != TAPER_OK) {
+        fail(line);
+    }
+}
+
+static void select_planning(const char *line) {
+    taper_planning_t *planning = &chosen.planning;
+    unsigned objective = 0, outer = 0, horizon = 0;
+    if (sscanf(line, "planning %u %d %u %u", &objective, &planning->lambda_milli_per_kWh2, &outer,
+               &horizon) != 4) {
+        fail(line);
+    }
+    planning->objective = (uint8_t)objective;
+    planning->outer_iterations = (uint8_t)outer;
+    planning->horizon_steps = (uint8_t)horizon;
+    start_cold(line);
 }
 
 static void select_station(const char *line) {
@@ -42,10 +65,9 @@ static void select_station(const char *line) {
     }
     for (unsigned k = 0; k < taper_station_count; k++) {
         if (strcmp(taper_stations[k]->name, name) == 0) {
-            config = taper_stations[k];
-            if (taper_planner_init(&planner, taper_solvers[k], config) != TAPER_OK) {
-                fail(line);
-            }
+            chosen = *taper_stations[k];
+            solver = taper_solvers[k];
+            start_cold(line);
             return;
         }
     }
@@ -142,8 +164,10 @@ int main(int argc, char **argv) {
     while (fgets(line, sizeof line, stdin) != NULL) {
         if (strncmp(line, "station", 7) == 0) {
             select_station(line);
-        } else if (config == NULL) {
+        } else if (solver == NULL) {
             fail(line);
+        } else if (strncmp(line, "planning", 8) == 0) {
+            select_planning(line);
         } else if (strncmp(line, "time", 4) == 0) {
             snapshot.now_ms = (uint32_t)strtoul(line + 4, NULL, 10);
         } else if (strncmp(line, "limit", 5) == 0) {

@@ -3,18 +3,19 @@
 #include "taper/rows.h"
 
 /* The ranges that the use of each quantity was thought through for; codegen/station_model.py has the same or narrower. */
-#define MOST_LIMIT_W         3276700  /* SITE_LIMIT: 15 bits of 100 W */
-#define MOST_LIMIT_mA        20000000 /* sums of weights and currents stay far within 64 bits */
-#define MOST_CURRENT_mA      409400   /* EVSE_STATUS: 12 bits of 0.1 A */
-#define LEAST_AC_mA          6000     /* IEC 61851-1 */
-#define MOST_VOLTAGE_mV      2000000
-#define LEAST_SITE_mV        50000
-#define MOST_TICK_ms         3600000u /* of the world: a second on the bus may be an hour */
-#define MOST_SWITCH_ms       86400000u
-#define MOST_CHANGE_ms       600000u
-#define MOST_REACTION_ms     60000u
-#define FULL_permille        1000
-#define MOST_SUPPLY_permille 100000 /* of a phase's current, for 1 A of setpoint */
+#define MOST_LIMIT_W               3276700  /* SITE_LIMIT: 15 bits of 100 W */
+#define MOST_LIMIT_mA              20000000 /* sums of weights and currents stay far within 64 bits */
+#define MOST_CURRENT_mA            409400   /* EVSE_STATUS: 12 bits of 0.1 A */
+#define LEAST_AC_mA                6000     /* IEC 61851-1 */
+#define MOST_VOLTAGE_mV            2000000
+#define LEAST_SITE_mV              50000
+#define MOST_TICK_ms               3600000u /* of the world: a second on the bus may be an hour */
+#define MOST_SWITCH_ms             86400000u
+#define MOST_CHANGE_ms             600000u
+#define MOST_REACTION_ms           60000u
+#define FULL_permille              1000
+#define MOST_LAMBDA_milli_per_kWh2 10000000
+#define MOST_SUPPLY_permille       100000 /* of a phase's current, for 1 A of setpoint */
 
 static bool within(int32_t value, int32_t least, int32_t most) {
     return value >= least && value <= most;
@@ -35,6 +36,14 @@ static bool movement_is_sound(const taper_station_config_t *config) {
     return within(config->ramp_mA_per_s, 0, MOST_CURRENT_mA) &&
            within(config->deadband_mA, 0, MOST_CURRENT_mA) &&
            within(config->price_weight_permille, 0, FULL_permille);
+}
+
+static bool planning_is_sound(const taper_station_config_t *config) {
+    const taper_planning_t *planning = &config->planning;
+    return planning->objective <= TAPER_OBJECTIVE_LOG_UTILITY && planning->horizon_steps != 1 &&
+           planning->horizon_steps <= config->steps &&
+           planning->outer_iterations <= TAPER_MAX_OUTER_ITERATIONS &&
+           within(planning->lambda_milli_per_kWh2, 0, MOST_LAMBDA_milli_per_kWh2);
 }
 
 static bool limits_are_sound(const taper_group_config_t *group) {
@@ -127,6 +136,7 @@ static bool connectors_are_sound(const taper_station_config_t *config) {
 
 taper_status_t taper_config_check(const taper_station_config_t *config) {
     const bool sound = sizes_fit(config) && times_are_sound(config) && movement_is_sound(config) &&
-                       tree_is_sound(config) && site_is_sound(config) && connectors_are_sound(config);
+                       planning_is_sound(config) && tree_is_sound(config) && site_is_sound(config) &&
+                       connectors_are_sound(config);
     return sound ? TAPER_OK : TAPER_ERR_CONFIG;
 }

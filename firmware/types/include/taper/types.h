@@ -124,6 +124,28 @@ typedef struct {
     uint8_t parent;       /**< TAPER_NO_GROUP for group 0 */
 } taper_group_config_t;
 
+/** What the planner is after. Defined by their numbers, which stand in the tables. */
+typedef enum {
+    TAPER_OBJECTIVE_THROUGHPUT = 0,  /**< energy, soon, and first to whom the time presses */
+    TAPER_OBJECTIVE_LOG_UTILITY = 1, /**< the paper's: proportional fairness (eq. 4 and 7) */
+} taper_objective_t;
+
+/** Most outer iterations of the log utility, and how many there are if a description does not say. */
+#define TAPER_MAX_OUTER_ITERATIONS     20
+#define TAPER_DEFAULT_OUTER_ITERATIONS 6
+
+/** How the planner plans. All 0: throughput over all steps, once a step and at every event. */
+typedef struct {
+    uint8_t objective;        /**< taper_objective_t */
+    uint8_t horizon_steps;    /**< that are planned, 2..steps; 0: all of the station's */
+    uint8_t outer_iterations; /**< of the log utility, 1..TAPER_MAX_OUTER_ITERATIONS; 0: the default */
+    bool
+        on_events; /**< the paper's rule: plan anew only when a vehicle comes, leaves or reaches its target, or a limit
+                            changes, and follow the plan in between */
+    bool learns_taper;             /**< from what vehicles accept; what they tell is a first guess */
+    int32_t lambda_milli_per_kWh2; /**< of the log utility: weight of the squared energy missing, >= 0 */
+} taper_planning_t;
+
 /** A station: what codegen makes of `codegen/stations/NAME.toml`. Constant, in flash. */
 typedef struct {
     const char *name;
@@ -141,9 +163,10 @@ typedef struct {
     int32_t ramp_mA_per_s;   /**< steepest increase; 0: at once */
     int32_t deadband_mA;     /**< smaller increases wait; 0: none */
     int32_t price_weight_permille; /**< of the price against having energy early, 0 (none)..1000 */
-    bool line_to_line;             /**< some connector is */
-    uint16_t step_s;               /**< length of a planning step */
-    uint8_t steps;                 /**< planning steps, the horizon */
+    taper_planning_t planning;
+    bool line_to_line; /**< some connector is */
+    uint16_t step_s;   /**< length of a planning step */
+    uint8_t steps;     /**< planning steps, the horizon */
     uint8_t connector_count;
     uint8_t group_count;
 } taper_station_config_t;
@@ -230,7 +253,7 @@ typedef struct {
     int32_t limit_W[TAPER_MAX_STEPS]; /**< of the site, for charging, >= 0 */
     uint8_t source[TAPER_MAX_STEPS];  /**< taper_limit_source_t: whose limit it is */
     int32_t phase_mA[3]; /**< as in taper_supply_t: what other load leaves now is taken to last */
-    bool priced;         /**< the prices of enough steps are known; those of others are their mean (limits.h) */
+    bool priced; /**< the prices of enough steps are known; those of others are their mean (limits.h) */
     int32_t milli_per_kWh[TAPER_MAX_STEPS]; /**< 0 unless `priced` */
 } taper_course_t;
 
