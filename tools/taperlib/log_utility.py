@@ -17,9 +17,11 @@ The logarithm is strictly concave, so that there is one answer.
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import dataclass
 
+import clarabel
 import cvxpy as cp
 import numpy as np
 import scipy.sparse as sp
@@ -28,6 +30,7 @@ from .planning_cases import Case
 from .planning_problem import Problem
 
 NEGLIGIBLE = 1e-3  # of the strongest connector's power
+ACCURACY = 1e-6  # of the exact answers, relative
 LEAST_POWER = 1e-6  # the same: what the logarithm of a smaller power is taken of
 PRECISE = {"tol_gap_abs": 1e-9, "tol_gap_rel": 1e-11, "tol_feas": 1e-9}
 """Clarabel's own 1e-8 is of the objective, where with a great lambda the energy missing hides the logarithms."""
@@ -41,8 +44,17 @@ class SolverError(Exception):
 class Exact:
     power_kW: np.ndarray  # [connectors of the station x steps]
     objective: float
+    duality_gap: float  # by which the objective may be short of the optimum
     solver_s: float  # Clarabel's own
     total_s: float  # with the statement in CVXPY, and its translation to cones
+
+    def first_step_doubt(self, base_kW: float) -> float:
+        """How far a power of the first step may be from the optimum's, as a share of base_kW.
+
+        A power that is off by the share d of itself costs d^2/2 of the objective at least, because of its logarithm.
+        """
+        share = math.sqrt(2 * max(self.duality_gap, 0))
+        return float(self.power_kW[:, 0].max() / base_kW * share / (1 - share)) if share < 1 else math.inf
 
 
 class LogUtility:
@@ -58,7 +70,7 @@ class LogUtility:
         self.need_kWh = np.array([demands[i].need_Wh / 1000 for i in self.connectors])
         most = self._most().reshape(len(self.connectors), station.steps)
         self.terms = most > NEGLIGIBLE
-        self.typical = self._typical(most)
+        self.unit = self._units(most)
 
     def _most(self) -> np.ndarray:
         """The least bound on each power by itself, per unit: from the rows in which nothing is negative."""
@@ -72,13 +84,13 @@ class LogUtility:
         np.minimum.at(most, column, self.problem.b[adds_up][row] / weight)
         return most
 
-    def _typical(self, most: np.ndarray) -> np.ndarray:
-        """A power for each vehicle, per unit, to count its powers in: what meets its need evenly, or else its strongest.
+    def _units(self, most: np.ndarray) -> np.ndarray:
+        """A unit for each power: what meets the vehicle's need evenly, or the most that it may be.
 
         The optimum of a vehicle that is nearly full is so small a power that the solver would not tell it from 0.
         """
         even = self.need_kWh / (self.base_kW * self.step_h * np.maximum(self.terms.sum(axis=1), 1))
-        return np.minimum(even, np.maximum(most.max(axis=1), NEGLIGIBLE))
+        return np.clip(most, NEGLIGIBLE, even[:, None])
 
     def objective(self, power_kW: np.ndarray) -> float:
         """Of a plan [connectors of the station x steps]. Powers below LEAST_POWER count as that much."""
@@ -107,20 +119,21 @@ class LogUtility:
     def _stated(self) -> tuple[cp.Problem, cp.Variable, sp.csr_matrix]:
         """The problem, its variables, and what makes (u, x) of them. Powers that are 0 are no variables."""
         count, steps = self.terms.size, self.station.steps
-        typical = np.tile(np.repeat(self.typical, steps), 2)
+        unit = self.unit.max(axis=1)
+        units = np.concatenate([self.unit.ravel(), np.repeat(unit, steps)])
         kept = np.concatenate([np.flatnonzero(self.terms), np.arange(count, 2 * count)])
-        expand = sp.diags(typical, format="csc")[:, kept]
+        expand = sp.diags(units, format="csc")[:, kept]
         z = cp.Variable(kept.size)
         logs = int(self.terms.sum())
         rows = (self.problem.R @ expand).tocsr()
         says_more = np.flatnonzero(rows.max(axis=1).toarray().ravel() > 0)  # than that a power is not negative
         factor = 1 / abs(rows[says_more]).max(axis=1).toarray().ravel()
         last = logs + np.arange(steps - 1, count, steps)
-        unit_kWh = self.base_kW * self.step_h * self.typical
+        unit_kWh = self.base_kW * self.step_h * unit
         utility = cp.sum(cp.log(z[:logs]))
         missing = cp.sum_squares(cp.multiply(unit_kWh, z[last]) - self.need_kWh)
         below = [
-            sp.diags(1 / typical[:count]) @ self.problem.E @ expand @ z == 0,
+            sp.diags(1 / np.repeat(unit, steps)) @ self.problem.E @ expand @ z == 0,
             sp.diags(factor) @ rows[says_more] @ z <= factor * self.problem.b[says_more],
         ]
         return cp.Problem(cp.Maximize(utility - self.weight * missing), below), z, expand
@@ -131,15 +144,24 @@ class LogUtility:
             return self._nothing()
         began = time.perf_counter()
         problem, z, expand = self._stated()
-        problem.solve(solver=cp.CLARABEL, **settings)
+        data, chain, inverse = problem.get_problem_data(cp.CLARABEL, solver_opts=dict(settings))
+        answer = chain.solve_via_data(problem, data, solver_opts=dict(settings))
         total_s = time.perf_counter() - began
-        if problem.status not in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):
-            raise SolverError(f"station {self.station.name}: Clarabel says {problem.status}")
-        u = expand @ z.value
+        duality_gap = self._judged(answer)
+        z.value = chain.invert(answer, inverse).primal_vars[z.id]
         power_kW = np.zeros((self.station.connectors, self.station.steps))
-        power_kW[self.connectors] = self.base_kW * u[: self.terms.size].reshape(self.terms.shape)
-        return Exact(power_kW, self.objective(power_kW), problem.solver_stats.solve_time, total_s)
+        power_kW[self.connectors] = self.base_kW * (expand @ z.value)[: self.terms.size].reshape(self.terms.shape)
+        return Exact(power_kW, self.objective(power_kW), duality_gap, answer.solve_time, total_s)
+
+    def _judged(self, answer: clarabel.DefaultSolution) -> float:
+        """The duality gap. Clarabel says "almost solved" of answers that miss its tolerances by little: the gap counts."""
+        gap = answer.obj_val - answer.obj_val_dual
+        scale = max(abs(answer.obj_val), float(self.terms.sum()))
+        worst = max(abs(gap) / scale, answer.r_prim, answer.r_dual)
+        if str(answer.status) not in ("Solved", "AlmostSolved") or not worst <= ACCURACY:
+            raise SolverError(f"station {self.station.name}: Clarabel says {answer.status}, gap {gap:.1e} of {scale:.1e}")
+        return gap
 
     def _nothing(self) -> Exact:
         power_kW = np.zeros((self.station.connectors, self.station.steps))
-        return Exact(power_kW, self.objective(power_kW), 0.0, 0.0)
+        return Exact(power_kW, self.objective(power_kW), 0.0, 0.0, 0.0)
