@@ -20,7 +20,10 @@ carried out, in percent of the power of the strongest connector; the difference 
 greater of the exact one and the number of logarithms; and medians of times: of the firmware, of Clarabel alone, of CVXPY
 and Clarabel (statement, translation, solution), and how many times faster than that the firmware is.
 
-Files in --out: gap.csv (the table), problems.csv (each problem with each number of outer iterations), timing.csv.
+With --timing all problems of the replay are instead planned in their order, each after the one before as in the firmware,
+by throughput (soc-mpc) and by log utility (soc-mpc-log), and COUNT of them by CVXPY and Clarabel, at their own tolerances.
+
+Files in --out: gap.csv (the table) and problems.csv (each problem with each number of outer iterations), or timing.csv.
 """
 
 from __future__ import annotations
@@ -38,9 +41,10 @@ from rich.table import Table
 from taperlib.cases import add_limit_arguments, limit_of_options
 from taperlib.files import InputError, write_atomically
 from taperlib.gaps import Gap, Line, Solved, csv_text, line_of
-from taperlib.log_utility import SolverError
+from taperlib.log_utility import LogUtility, SolverError
 from taperlib.numbers import not_negative, positive, whole_positive
 from taperlib.planner_probe import plan_cold
+from taperlib.planner_times import Times, times_of_day
 from taperlib.planning_cases import SEED, Case, draw, evenly, read_problems
 from taperlib.sessions import read_sessions_csv
 
@@ -48,7 +52,7 @@ ROOT = Path(__file__).resolve().parents[1]
 SIMULATOR = Path("build/host-release/host_sim/taper-sim")
 PROBE = Path("build/host-release/tests/planner/planner_probe")
 OUTER_ITERATIONS = "1,2,3,4,6,8"
-WIDTH = 120  # of the table, also where the terminal has less
+WIDTH = 140  # of the table, also where the terminal has less
 MOST_OUTER_ITERATIONS = 20  # TAPER_MAX_OUTER_ITERATIONS
 
 
@@ -81,6 +85,7 @@ def _parser() -> argparse.ArgumentParser:
                         help="problems of the replay, evenly taken (default 40)")
     parser.add_argument("--outer-iterations", type=_outer_iterations, default=_outer_iterations(OUTER_ITERATIONS),
                         metavar="N,..", help=f"of the firmware, 1 to 20 each (default {OUTER_ITERATIONS})")
+    parser.add_argument("--timing", action="store_true", help="compare times instead of plans, on the problems of a day")
     parser.add_argument("--out", type=Path, help="folder for the CSV files (default: none are written)")
     parser.add_argument("--sim", type=Path, default=ROOT / SIMULATOR, help=f"the simulator (default {SIMULATOR})")
     parser.add_argument("--probe", type=Path, default=ROOT / PROBE, help=f"the planner (default {PROBE})")
@@ -105,13 +110,18 @@ def _recorded(options: argparse.Namespace) -> list[Case]:
         return read_problems(problems)
 
 
-def _cases(options: argparse.Namespace) -> list[Case]:
-    if options.generated is not None:
-        return [draw(number, options.seed) for number in range(options.generated)]
-    cases = evenly(_recorded(options), options.problems)
+def _replayed(options: argparse.Namespace) -> list[Case]:
+    cases = _recorded(options)
     if not cases:
         raise InputError(f"{options.sessions}: no vehicle ever charges")
     return cases
+
+
+def _cases(options: argparse.Namespace) -> list[Case]:
+    if options.generated is not None:
+        return [draw(number, options.seed) for number in range(options.generated)]
+    cases = _replayed(options)
+    return [cases[k] for k in evenly(len(cases), options.problems)]
 
 
 def _gaps(options: argparse.Namespace, console: Console) -> list[list[Gap]]:
@@ -124,42 +134,77 @@ def _gaps(options: argparse.Namespace, console: Console) -> list[list[Gap]]:
     return found
 
 
-HEADINGS = ("outer\niterations", "problems", "without\na plan", "first step\nworst %", "first step\nmean %",
-            "objective\nworst %", "objective\nmean %", "firmware\nms", "Clarabel\nms", "CVXPY +\nClarabel ms",
-            "times\nfaster")
+GAP_HEADINGS = ("outer\niterations", "problems", "without\na plan", "first step\nworst %", "first step\nmean %",
+                "objective\nworst %", "objective\nmean %", "firmware\nms", "Clarabel\nms", "CVXPY +\nClarabel ms",
+                "times\nfaster")
+TIME_HEADINGS = ("problems", "soc-mpc\nms", "soc-mpc-log\nms", "ratio", "exact\nproblems", "soc-mpc-log\non these, ms",
+                 "Clarabel\nms", "times\nfaster", "CVXPY +\nClarabel ms", "times\nfaster")
 
 
-def _print_table(lines: list[Line], console: Console) -> None:
+def _print_table(headings: tuple[str, ...], rows: list[list[str]], console: Console) -> None:
     table = Table(header_style="bold")
-    for heading in HEADINGS:
+    for heading in headings:
         table.add_column(heading, justify="right")
-    for line in lines:
-        table.add_row(
-            str(line.outer_iterations), str(line.problems), str(line.without_plan),
-            f"{line.first_step_worst_percent:.3f}", f"{line.first_step_mean_percent:.4f}",
-            f"{line.objective_worst_percent:.4f}", f"{line.objective_mean_percent:.5f}",
-            f"{line.firmware_ms:.2f}", f"{line.exact_solver_ms:.1f}", f"{line.exact_total_ms:.1f}",
-            f"{line.times_faster:.1f}",
-        )
+    for row in rows:
+        table.add_row(*row)
     Console(width=max(console.width, WIDTH)).print(table)
+
+
+def _gap_row(line: Line) -> list[str]:
+    return [
+        str(line.outer_iterations), str(line.problems), str(line.without_plan),
+        f"{line.first_step_worst_percent:.3f}", f"{line.first_step_mean_percent:.4f}",
+        f"{line.objective_worst_percent:.4f}", f"{line.objective_mean_percent:.5f}",
+        f"{line.firmware_ms:.2f}", f"{line.exact_solver_ms:.1f}", f"{line.exact_total_ms:.1f}", f"{line.times_faster:.1f}",
+    ]
+
+
+def _time_row(times: Times) -> list[str]:
+    return [
+        str(times.problems), f"{times.throughput_ms:.2f}", f"{times.log_utility_ms:.2f}", f"{times.log_to_throughput:.2f}",
+        str(times.exact_problems), f"{times.log_utility_on_those_ms:.2f}",
+        f"{times.exact_solver_ms:.1f}", f"{times.solver_to_log:.1f}", f"{times.exact_total_ms:.1f}", f"{times.exact_to_log:.1f}",
+    ]
+
+
+def _compare_plans(options: argparse.Namespace, console: Console) -> None:
+    gaps = _gaps(options, console)
+    lines = [line_of(of_outer) for of_outer in gaps]
+    if options.out is not None:
+        write_atomically(options.out / "gap.csv", csv_text(lines, Line))
+        write_atomically(options.out / "problems.csv", csv_text([gap for of_outer in gaps for gap in of_outer], Gap))
+    _print_table(GAP_HEADINGS, [_gap_row(line) for line in lines], console)
+
+
+def _compare_times(options: argparse.Namespace, console: Console) -> None:
+    cases = _replayed(options)
+    chosen = track(evenly(len(cases), options.problems), "exact solver", console=console, transient=True)
+    exact = {k: LogUtility(cases[k]).solve() for k in chosen}
+    times = times_of_day(options.probe, cases, exact)
+    if options.out is not None:
+        write_atomically(options.out / "timing.csv", csv_text([times], Times))
+    _print_table(TIME_HEADINGS, [_time_row(times)], console)
+
+
+def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
+    """What argparse does not: which options belong together."""
+    limited = any(value is not None for value in (options.limit_kw, options.limit_share, options.limit_csv))
+    if options.sessions is not None and not limited:
+        parser.error("--sessions needs one of --limit-kw, --limit-share and --limit-csv")
+    if options.generated is not None and options.timing:
+        parser.error("--timing needs --sessions: the problems of a day in their order")
 
 
 def main(arguments: list[str] | None = None) -> int:
     parser = _parser()
     options = parser.parse_args(arguments)
-    if options.sessions is not None and not any((options.limit_kw is not None, options.limit_share, options.limit_csv)):
-        parser.error("--sessions needs one of --limit-kw, --limit-share and --limit-csv")
+    _check(parser, options)
     console = Console()
     try:
-        gaps = _gaps(options, console)
-        lines = [line_of(of_outer) for of_outer in gaps]
-        if options.out is not None:
-            write_atomically(options.out / "gap.csv", csv_text(lines, Line))
-            write_atomically(options.out / "problems.csv", csv_text([gap for of_outer in gaps for gap in of_outer], Gap))
+        (_compare_times if options.timing else _compare_plans)(options, console)
     except (InputError, SolverError, OSError) as error:
         Console(stderr=True).print(f"reference: {error}", markup=False, highlight=False, soft_wrap=True)
         return 1
-    _print_table(lines, console)
     return 0
 
 

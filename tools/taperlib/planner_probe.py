@@ -10,10 +10,12 @@ from pathlib import Path
 import numpy as np
 
 from .files import InputError
-from .planning_cases import LOG_UTILITY, Case
+from .planning_cases import Case
 from .planning_problem import Demand, Station
 
 SOLVED, INACCURATE = 2, 3  # taper_verdict_t
+THROUGHPUT, LOG_UTILITY = 0, 1  # taper_objective_t
+DEFAULT = 0  # outer iterations: as many as the firmware takes of itself
 
 
 @dataclass(frozen=True)
@@ -39,11 +41,10 @@ def demand_line(station: Station, i: int, d: Demand) -> str:
     )
 
 
-def cold_start(case: Case, outer_iterations: int) -> list[str]:
-    """Lines that choose station and planning, by log utility."""
+def cold_start(case: Case, objective: int, outer_iterations: int) -> list[str]:
+    """Lines that choose station and planning."""
     milli = round(1000 * case.lambda_per_kWh2)
-    planning = f"planning {LOG_UTILITY} {milli} {outer_iterations} {case.horizon_steps}"
-    return [f"station {case.station.name}", planning]
+    return [f"station {case.station.name}", f"planning {objective} {milli} {outer_iterations} {case.horizon_steps}"]
 
 
 def problem_lines(case: Case) -> list[str]:
@@ -70,7 +71,13 @@ def run_probe(probe: Path, lines: list[str], cases: list[Case]) -> list[Planned]
     return [_planned(list(islice(answers, 1 + case.station.connectors)), case) for case in cases]
 
 
-def plan_cold(probe: Path, cases: list[Case], outer_iterations: int) -> list[Planned]:
-    """Each problem without any memory of the one before."""
-    lines = [line for case in cases for line in [*cold_start(case, outer_iterations), *problem_lines(case)]]
+def plan_cold(probe: Path, cases: list[Case], outer_iterations: int = DEFAULT) -> list[Planned]:
+    """By log utility, each problem without any memory of the one before."""
+    lines = [line for case in cases for line in [*cold_start(case, LOG_UTILITY, outer_iterations), *problem_lines(case)]]
+    return run_probe(probe, lines, cases)
+
+
+def plan_warm(probe: Path, cases: list[Case], objective: int) -> list[Planned]:
+    """Problems of one station in their order, each after the one before, as the firmware has them in a day."""
+    lines = cold_start(cases[0], objective, DEFAULT) + [line for case in cases for line in problem_lines(case)]
     return run_probe(probe, lines, cases)

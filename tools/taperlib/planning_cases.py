@@ -9,7 +9,6 @@ from pathlib import Path
 from .files import InputError, read_text
 from .planning_problem import Connector, Demand, Station, read_station
 
-LOG_UTILITY = 1  # taper_objective_t
 STATIONS = ("hub", "garage", "paper")
 KINDS = ("empty", "saturated", "uneven", "nearly full")
 LAMBDAS = (1.0, 10.0, 100.0)
@@ -96,11 +95,10 @@ def _case_of(recording: _Recording, demands: dict[int, Demand], limit_W: list[in
                 recording.time_ms)
 
 
-def evenly(cases: list[Case], count: int) -> list[Case]:
-    """So many of them, from the first to the last."""
-    if count >= len(cases):
-        return cases
-    return [cases[k * len(cases) // count] for k in range(count)]
+def evenly(cases: int, count: int) -> list[int]:
+    """The places of so many of them, or of all, from the first on."""
+    count = min(count, cases)
+    return [k * cases // count for k in range(count)]
 
 
 # ---- Drawn
