@@ -117,26 +117,26 @@ class LogUtility:
         return float(np.abs(power_kW[:, 0] - exact.power_kW[:, 0]).max() / self.base_kW)
 
     def _stated(self) -> tuple[cp.Problem, cp.Variable, sp.csr_matrix]:
-        """The problem, its variables, and what makes (u, x) of them. Powers that are 0 are no variables."""
+        """The problem, its variables, and what makes (u, x) of them. Powers that are 0 are no variables, nor their sums."""
         count, steps = self.terms.size, self.station.steps
+        charges = self.terms.any(axis=1)
+        energies = np.flatnonzero(np.repeat(charges, steps))
         unit = self.unit.max(axis=1)
         units = np.concatenate([self.unit.ravel(), np.repeat(unit, steps)])
-        kept = np.concatenate([np.flatnonzero(self.terms), np.arange(count, 2 * count)])
-        expand = sp.diags(units, format="csc")[:, kept]
-        z = cp.Variable(kept.size)
-        logs = int(self.terms.sum())
+        expand = sp.diags(units, format="csc")[:, np.concatenate([np.flatnonzero(self.terms), count + energies])]
+        z = cp.Variable(expand.shape[1])
+        logs = expand.shape[1] - energies.size
+        last = np.arange(logs + steps - 1, expand.shape[1], steps)
+        missing = cp.multiply(self.base_kW * self.step_h * unit[charges], z[last]) - self.need_kWh[charges]
         rows = (self.problem.R @ expand).tocsr()
         says_more = np.flatnonzero(rows.max(axis=1).toarray().ravel() > 0)  # than that a power is not negative
         factor = 1 / abs(rows[says_more]).max(axis=1).toarray().ravel()
-        last = logs + np.arange(steps - 1, count, steps)
-        unit_kWh = self.base_kW * self.step_h * unit
-        utility = cp.sum(cp.log(z[:logs]))
-        missing = cp.sum_squares(cp.multiply(unit_kWh, z[last]) - self.need_kWh)
         below = [
-            sp.diags(1 / np.repeat(unit, steps)) @ self.problem.E @ expand @ z == 0,
+            (sp.diags(1 / np.repeat(unit, steps)) @ self.problem.E @ expand)[energies] @ z == 0,
             sp.diags(factor) @ rows[says_more] @ z <= factor * self.problem.b[says_more],
         ]
-        return cp.Problem(cp.Maximize(utility - self.weight * missing), below), z, expand
+        utility = cp.sum(cp.log(z[:logs])) - self.weight * cp.sum_squares(missing)
+        return cp.Problem(cp.Maximize(utility), below), z, expand
 
     def solve(self, **settings: float) -> Exact:
         """The optimum. `settings` are Clarabel's, for example PRECISE. Raises SolverError."""
