@@ -3,7 +3,6 @@
 #include <tgmath.h>
 
 #include "sums.h"
-#include "taper/battery.h"
 #include "taper/battery_slope.h"
 #include "taper/real_math.h"
 #include "worth.h"
@@ -52,7 +51,7 @@ static chain_t chain_of(const taper_horizon_t *horizon, const taper_demand_t *de
     const taper_real_t slope = taper_battery_slope_per_h(demand) * step_h;
     return (chain_t){
         .rate = (taper_real_t)taper_demand_allowed_W(demand) / horizon->base_W,
-        .taper = (taper_real_t)taper_battery_limit_W(demand) / horizon->base_W,
+        .taper = taper_battery_limit_now_W(demand) / horizon->base_W,
         .slope = slope < 1 ? slope
                            : 1, /* a battery that fills within one step: the taper row then bounds v(i,t) */
         .need = (taper_real_t)demand->need_Wh / (horizon->base_W * step_h),
