@@ -8,6 +8,7 @@ import os
 from dataclasses import replace
 from pathlib import Path
 
+import cvxpy as cp
 import numpy as np
 import pytest
 import reference
@@ -87,6 +88,30 @@ def test_the_gap_of_powers_that_are_all_a_thousandth_off_is_a_thousandth() -> No
     assert abs(best.objective) < 1e-3
     assert utility.gap(0.999 * best.power_kW, best) == pytest.approx(1e-3, rel=1e-2)
     assert utility.first_step_difference(0.999 * best.power_kW, best) == pytest.approx(1e-3 / PEAK_KW, rel=1e-2)
+
+
+def written_plainly(drawn: Case) -> cp.Problem:
+    """Equation 7 in kW and kWh, of a station with one limit, of which no vehicle leaves within a step."""
+    demands = list(drawn.demands.values())
+    limit_kW = np.array(drawn.limit_W) / 1000
+    stay = np.array([[d.departs_in_s > t * 900 for t in range(limit_kW.size)] for d in demands])
+    slope = np.array([d.taper_W / d.capacity_Wh for d in demands])[:, None]
+    now_kW = np.array([d.peak_W - d.taper_W * d.stored_Wh / d.capacity_Wh for d in demands])[:, None] / 1000
+    need_kWh = np.array([d.need_Wh for d in demands]) / 1000
+    power_kW = cp.Variable(stay.shape, nonneg=True)
+    energy_kWh = STEP_H * cp.cumsum(power_kW, axis=1)
+    rows = [power_kW <= 7.36 * stay, power_kW[:, 1:] + cp.multiply(slope, energy_kWh[:, :-1]) <= now_kW,
+            power_kW[:, :1] <= now_kW, energy_kWh[:, -1] <= need_kWh, cp.sum(power_kW, axis=0) <= limit_kW]
+    missing = cp.sum_squares(energy_kWh[:, -1] - need_kWh)
+    return cp.Problem(cp.Maximize(cp.sum(cp.log(power_kW[stay])) - drawn.lambda_per_kWh2 * missing), rows)
+
+
+def test_the_papers_formula_written_out_plainly_has_the_same_optimum() -> None:
+    drawn = draw(1 + 12)
+    assert drawn.name == "13: garage, saturated, lambda 10, with taper"
+    whole = {i: replace(d, departs_in_s=d.departs_in_s // 900 * 900) for i, d in drawn.demands.items()}
+    drawn = replace(drawn, demands=whole)
+    assert LogUtility(drawn).solve().objective == pytest.approx(written_plainly(drawn).solve(solver=cp.CLARABEL), rel=1e-6)
 
 
 def test_nothing_is_planned_without_power() -> None:

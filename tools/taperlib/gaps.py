@@ -22,6 +22,7 @@ class Gap:
     verdict: int
     solver_iterations: int
     first_step_percent: float  # of peak power
+    exact_doubt_percent: float  # of the exact one, Exact.first_step_doubt
     objective_percent: float  # LogUtility.gap
     objective: float
     exact_objective: float
@@ -78,6 +79,7 @@ class Solved:
             verdict=planned.verdict,
             solver_iterations=planned.iterations,
             first_step_percent=100 * self.utility.first_step_difference(planned.power_kW, self.exact),
+            exact_doubt_percent=100 * self.exact.first_step_doubt(self.utility.base_kW),
             objective_percent=100 * self.utility.gap(planned.power_kW, self.exact),
             objective=self.utility.objective(planned.power_kW),
             exact_objective=self.exact.objective,
