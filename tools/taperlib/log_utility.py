@@ -32,8 +32,9 @@ from .planning_problem import Problem
 NEGLIGIBLE = 1e-3  # of the strongest connector's power
 ACCURACY = 1e-6  # of the exact answers, relative
 LEAST_POWER = 1e-6  # the same: what the logarithm of a smaller power is taken of
-PRECISE = {"tol_gap_abs": 1e-9, "tol_gap_rel": 1e-11, "tol_feas": 1e-9}
-"""Clarabel's own 1e-8 is of the objective, where with a great lambda the energy missing hides the logarithms."""
+PRECISE = {"tol_gap_abs": 1e-9, "tol_gap_rel": 1e-11, "tol_feas": 1e-9, "equilibrate_enable": False}
+"""Clarabel's own 1e-8 is of the objective, where with a great lambda the energy missing hides the logarithms. The problem
+comes scaled: without Clarabel's scaling the duality gaps are smaller."""
 
 
 class SolverError(Exception):
