@@ -143,7 +143,6 @@ void taper_planner_start(taper_planner_t *planner, const taper_snapshot_t *snaps
     }
     taper_horizon_build(horizon, horizon->config, snapshot, course);
     taper_warm_start(planner, snapshot, shift);
-    set_tolerance(planner);
     if (horizon->log_utility) {
         taper_utility_begin(planner);
     }
