@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from statistics import mean, median
 
-from .log_utility import PRECISE, Exact, LogUtility
+from .log_utility import Exact, LogUtility
 from .planner_probe import Planned
 from .planning_cases import Case
 
@@ -68,7 +68,7 @@ class Solved:
     @staticmethod
     def of(case: Case) -> Solved:
         utility = LogUtility(case)
-        return Solved(case, utility, utility.solve(**PRECISE))
+        return Solved(case, utility, utility.solve_precisely())
 
     def gap(self, planned: Planned, outer_iterations: int) -> Gap:
         return Gap(
