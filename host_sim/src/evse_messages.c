@@ -39,8 +39,8 @@ static taper_message_t evse_status(const sim_evse_t *evse) {
 }
 
 static taper_message_t ev_status(const sim_evse_t *evse) {
-    // The limit of the on-board charger is flat: it says nothing about the taper of the battery.
-    const double max_mA = evse->vehicle->max_kw / sim_evse_kw_per_A(evse) * 1000.0;
+    // The limit of the charger is flat: it says nothing about the taper of the battery.
+    const double max_mA = sim_session_most_kw(evse->vehicle) / sim_evse_kw_per_A(evse) * 1000.0;
     return (taper_message_t){.kind = TAPER_MESSAGE_EV_STATUS,
                              .as.ev_status = {.soc_permille = soc_permille(sim_evse_soc(evse)),
                                               .soc_age_s = 0,
