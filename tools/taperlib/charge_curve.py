@@ -60,6 +60,16 @@ def most_kw(curve: Curve) -> float:
     return max(kw for _, kw in curve)
 
 
+def capped(curve: Curve, cap_kw: float) -> Curve:
+    """The curve behind a connector of `cap_kw`."""
+    points: list[Point] = [(curve[0][0], min(curve[0][1], cap_kw))]
+    for (soc, kw), (next_soc, next_kw) in zip(curve, curve[1:], strict=False):
+        if (kw - cap_kw) * (next_kw - cap_kw) < 0:
+            points.append((round(soc + (cap_kw - kw) / (next_kw - kw) * (next_soc - soc), 6), cap_kw))
+        points.append((next_soc, min(next_kw, cap_kw)))
+    return tuple(points)
+
+
 def hull_points(curve: Curve) -> list[Point]:
     """Corners of the least concave curve that is nowhere below this one, on SOC 0..1."""
     points = [(0.0, curve[0][1])] * (curve[0][0] > 0) + list(curve) + [(1.0, curve[-1][1])] * (curve[-1][0] < 1)
