@@ -29,6 +29,34 @@ static void test_the_limit_is_never_negative(void) {
     TEST_ASSERT_EQUAL_INT32(0, taper_battery_limit_W(&demand));
 }
 
+static taper_demand_t of_two_lines(int32_t stored_Wh) {
+    taper_demand_t demand = tapered(stored_Wh); /* 7360 - 6000 SOC */
+    demand.second_peak_W = 20000;
+    demand.second_taper_W = 19800; /* they cross at SOC 0.9159 */
+    return demand;
+}
+
+static void test_of_two_lines_the_lower_one_counts(void) {
+    const taper_demand_t empty = of_two_lines(0);
+    const taper_demand_t before = of_two_lines(54000); /* 0.9: 1960 and 2180 */
+    const taper_demand_t behind = of_two_lines(57000); /* 0.95: 1660 and 1190 */
+    const taper_demand_t full = of_two_lines(60000);
+    TEST_ASSERT_EQUAL_INT32(7360, taper_battery_limit_W(&empty));
+    TEST_ASSERT_EQUAL_INT32(1960, taper_battery_limit_W(&before));
+    TEST_ASSERT_EQUAL_INT32(1190, taper_battery_limit_W(&behind));
+    TEST_ASSERT_EQUAL_INT32(200, taper_battery_limit_W(&full));
+    TEST_ASSERT_EQUAL_INT32(1190, taper_battery_useful_W(&behind, 1000));
+}
+
+static void test_a_line_may_begin_above_what_connector_and_vehicle_allow(void) {
+    taper_demand_t demand = of_two_lines(12000); /* 0.2 */
+    demand.peak_W = 100000;
+    demand.taper_W = 90000;
+    TEST_ASSERT_EQUAL_INT32(7360, taper_battery_useful_W(&demand, 1000));
+    demand.stored_Wh = 58800; /* 0.98: 11800 and 596 */
+    TEST_ASSERT_EQUAL_INT32(596, taper_battery_useful_W(&demand, 1000));
+}
+
 static void test_an_unknown_capacity_means_no_taper(void) {
     taper_demand_t demand = tapered(30000);
     demand.capacity_Wh = 0;
@@ -88,6 +116,8 @@ int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_the_limit_falls_on_a_line_from_the_peak);
     RUN_TEST(test_the_limit_is_never_negative);
+    RUN_TEST(test_of_two_lines_the_lower_one_counts);
+    RUN_TEST(test_a_line_may_begin_above_what_connector_and_vehicle_allow);
     RUN_TEST(test_an_unknown_capacity_means_no_taper);
     RUN_TEST(test_useful_power_is_bounded_by_connector_taper_and_need);
     RUN_TEST(test_nothing_is_useful_for_an_inactive_demand);

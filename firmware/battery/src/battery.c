@@ -7,11 +7,7 @@ static int64_t divide_up(int64_t numerator, int64_t denominator) {
 }
 
 int32_t taper_battery_limit_W(const taper_demand_t *demand) {
-    if (demand->capacity_Wh <= 0) {
-        return demand->peak_W;
-    }
-    const int64_t fall_W = taper_quotient((int64_t)demand->taper_W * demand->stored_Wh, demand->capacity_Wh);
-    return taper_saturate_i32(fall_W >= demand->peak_W ? 0 : demand->peak_W - fall_W);
+    return taper_demand_battery_W(demand);
 }
 
 int32_t taper_battery_useful_W(const taper_demand_t *demand, uint32_t tick_ms) {
