@@ -23,6 +23,9 @@ void sim_problems_add(FILE *file, const taper_station_t *station) {
                     (long)d->stored_Wh, (long)d->capacity_Wh, (long)d->need_Wh, (long)d->peak_W,
                     (long)d->taper_W, (long)d->max_mA, (long)d->W_per_A, (long)d->departs_in_s);
         }
+        if (d->active && d->second_peak_W > 0) {
+            fprintf(file, "second %u %ld %ld\n", i, (long)d->second_peak_W, (long)d->second_taper_W);
+        }
     }
     fprintf(file, "solve\n");
 }

@@ -48,6 +48,16 @@ static void test_of_two_lines_the_lower_one_counts(void) {
     TEST_ASSERT_EQUAL_INT32(1190, taper_battery_useful_W(&behind, 1000));
 }
 
+static void test_each_line_by_itself(void) {
+    const taper_demand_t demand = of_two_lines(54000);
+    const taper_demand_t one = tapered(54000);
+    TEST_ASSERT_EQUAL_INT32(1960, taper_battery_line_W(&demand, 0));
+    TEST_ASSERT_EQUAL_INT32(2180, taper_battery_line_W(&demand, 1));
+    TEST_ASSERT_EQUAL_INT32(TAPER_NO_LIMIT, taper_battery_line_W(&one, 1));
+    const taper_real_t per_mille = taper_battery_slope_per_h(&demand, 1) * 1000; /* 19.8 kW over 60 kWh */
+    TEST_ASSERT_TRUE(per_mille > (taper_real_t)329.9 && per_mille < (taper_real_t)330.1);
+}
+
 static void test_a_line_may_begin_above_what_connector_and_vehicle_allow(void) {
     taper_demand_t demand = of_two_lines(12000); /* 0.2 */
     demand.peak_W = 100000;
@@ -61,7 +71,7 @@ static void test_an_unknown_capacity_means_no_taper(void) {
     taper_demand_t demand = tapered(30000);
     demand.capacity_Wh = 0;
     TEST_ASSERT_EQUAL_INT32(7360, taper_battery_limit_W(&demand));
-    TEST_ASSERT_TRUE(taper_battery_slope_per_h(&demand) == 0);
+    TEST_ASSERT_TRUE(taper_battery_slope_per_h(&demand, 0) == 0);
 }
 
 static void test_useful_power_is_bounded_by_connector_taper_and_need(void) {
@@ -83,7 +93,7 @@ static void test_nothing_is_useful_for_an_inactive_demand(void) {
 
 static void test_the_slope_is_the_taper_over_the_capacity(void) {
     const taper_demand_t demand = tapered(30000);
-    const taper_real_t per_mille = taper_battery_slope_per_h(&demand) * 1000;
+    const taper_real_t per_mille = taper_battery_slope_per_h(&demand, 0) * 1000;
     TEST_ASSERT_TRUE(per_mille > (taper_real_t)99.99 && per_mille < (taper_real_t)100.01);
 }
 
@@ -117,6 +127,7 @@ int main(void) {
     RUN_TEST(test_the_limit_falls_on_a_line_from_the_peak);
     RUN_TEST(test_the_limit_is_never_negative);
     RUN_TEST(test_of_two_lines_the_lower_one_counts);
+    RUN_TEST(test_each_line_by_itself);
     RUN_TEST(test_a_line_may_begin_above_what_connector_and_vehicle_allow);
     RUN_TEST(test_an_unknown_capacity_means_no_taper);
     RUN_TEST(test_useful_power_is_bounded_by_connector_taper_and_need);

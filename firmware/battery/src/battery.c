@@ -10,6 +10,16 @@ int32_t taper_battery_limit_W(const taper_demand_t *demand) {
     return taper_demand_battery_W(demand);
 }
 
+int32_t taper_battery_line_W(const taper_demand_t *demand, uint8_t line) {
+    const int32_t peak_W = line == 0 ? demand->peak_W : demand->second_peak_W;
+    if (line > 0 && peak_W <= 0) {
+        return TAPER_NO_LIMIT;
+    }
+    return demand->capacity_Wh <= 0
+               ? peak_W
+               : taper_demand_line_W(demand, peak_W, line == 0 ? demand->taper_W : demand->second_taper_W);
+}
+
 int32_t taper_battery_useful_W(const taper_demand_t *demand, uint32_t tick_ms) {
     if (!demand->active || tick_ms == 0) {
         return 0;
@@ -22,9 +32,10 @@ int32_t taper_battery_useful_W(const taper_demand_t *demand, uint32_t tick_ms) {
     return taper_saturate_i32(divide_up(need_mWs, tick_ms));
 }
 
-taper_real_t taper_battery_slope_per_h(const taper_demand_t *demand) {
+taper_real_t taper_battery_slope_per_h(const taper_demand_t *demand, uint8_t line) {
     if (demand->capacity_Wh <= 0) {
         return 0;
     }
-    return (taper_real_t)demand->taper_W / (taper_real_t)demand->capacity_Wh;
+    const int32_t taper_W = line == 0 ? demand->taper_W : demand->second_taper_W;
+    return (taper_real_t)taper_W / (taper_real_t)demand->capacity_Wh;
 }

@@ -57,7 +57,7 @@ static bool solver_fits(const taper_solver_t *solver, const taper_horizon_t *hor
     const OSQPInt variables = (OSQPInt)config->connector_count * config->steps;
     return solver->connectors == config->connector_count && solver->steps == config->steps &&
            solver->sums == horizon->sum_count && solver->variables == variables &&
-           solver->rows == 2 * variables + (OSQPInt)horizon->sum_count * config->steps;
+           solver->rows == (OSQPInt)taper_first_sum_row(config) + (OSQPInt)horizon->sum_count * config->steps;
 }
 
 /** Write the matrices' values, and note whether they changed, by tapers or by what connectors count. @return they fit. */
@@ -159,8 +159,7 @@ bool taper_planner_is_usable(taper_verdict_t verdict) {
 /** Whether the rows hold by our own account: the solver's says nothing if its memory is not what we gave it. */
 static bool rows_hold(const taper_planner_t *planner) {
     const taper_residual_t residual = taper_residual(&planner->horizon, planner->solver->osqp->solution->x);
-    const taper_real_t tolerance =
-        absolute_tolerance(planner) + relative_tolerance(planner) * residual.size;
+    const taper_real_t tolerance = absolute_tolerance(planner) + relative_tolerance(planner) * residual.size;
     return residual.worst <= RESIDUAL_FACTOR * tolerance + absolute_tolerance(planner);
 }
 

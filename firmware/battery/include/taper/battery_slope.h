@@ -5,7 +5,7 @@
 #include "taper/real.h"
 #include "taper/types.h"
 
-/** Fall of the limit per energy charged: `a` in `u + a x <= p` [1/h], >= 0. */
-taper_real_t taper_battery_slope_per_h(const taper_demand_t *demand);
+/** Fall of line 0 or 1 of the limit per energy charged: `a` in `u + a x <= p` [1/h], >= 0. */
+taper_real_t taper_battery_slope_per_h(const taper_demand_t *demand, uint8_t line);
 
 #endif

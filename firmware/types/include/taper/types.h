@@ -142,6 +142,7 @@ typedef struct {
     bool
         on_events; /**< the paper's rule: plan anew only when a vehicle comes, leaves or reaches its target, or a limit
                             changes, and follow the plan in between */
+    uint8_t taper_lines; /**< of a vehicle that are planned with, 1 or 2; 0: 1. The solver is generated for as many */
     bool learns_taper;             /**< from what vehicles accept; what they tell is a first guess */
     int32_t lambda_milli_per_kWh2; /**< of the log utility: weight of the squared energy missing, >= 0 */
 } taper_planning_t;
