@@ -64,6 +64,18 @@ def test_without_a_curve_a_vehicle_takes_the_least_of_its_lines(sim):
         assert power_kw == pytest.approx(min(12, 18 - 16 * soc), abs=0.01)
 
 
+@pytest.mark.parametrize("policy", ["edf-soc", "llf"])
+def test_a_second_line_reaches_the_station_where_tapers_are_told(sim, policy):
+    """9 - 8 SOC is below the first line from SOC 0 on; the curve would allow more."""
+    car = session("a", **CAR, second_max_kw=9, second_taper_kw=8, curve="0:20 1:20")
+    told = sim.run([car], *UNLIMITED, policy=policy, out="told")
+    assert len(powers(told)) > 60
+    for soc, power_kw in powers(told):
+        assert power_kw == pytest.approx(9 - 8 * soc, abs=0.15)  # of 0.1 A and half a percent of SOC
+    blind = sim.run([car], *UNLIMITED, policy="edf", out="blind")
+    assert powers(blind)[0][1] == pytest.approx(20, abs=0.01)
+
+
 @pytest.mark.parametrize("curve, reason", [
     ("0:5", "fewer than two points"),
     ("0:5 0:6", "point 2: SOC does not ascend"),
