@@ -8,16 +8,17 @@ of step t. Rows, with v(i,-1) = 0:
 
     rate    i*T + t                      v(i,t) - v(i,t-1)
     taper   N*T + i*(T-1) + (t-1)        v(i,t) - (1 - a_i) v(i,t-1), t >= 1
-    target  N*T + N*(T-1) + i            0.58 v(i,T-1)
-    sum     N*T + N*(T-1) + N + r*T + t  s_r * sum of c_ri (v(i,t) - v(i,t-1)) over the n_r connectors in row r
+    target  M + i                        0.58 v(i,T-1)                           M = N*T + N*(T-1)
+    sum     M + N + r*T + t              s_r * sum of c_ri (v(i,t) - v(i,t-1)) over the n_r connectors in row r
 
 with s_r = sqrt(5 / n_r); for sums of currents 0.4 sqrt(5 / sum of c_ri^2). c_ri is what the row counts per power of the
 connector: supply power, or current times the site's voltage. The factors 0.58 and s_r make the rows alike in size, which
-OSQP's convergence depends on.
+OSQP's convergence depends on. Of a station that plans with two lines of the taper, as many rows for the second lines follow on
+those of the first, with a_i of their own: M is N*T + 2*N*(T-1).
 
 In the compressed columns the entries stand by ascending row. Column v(i,t) of A is therefore
 
-    1 (rate t), -1 (rate t+1), 1 (taper t), -(1-a_i) (taper t+1), 0.58 (target),
+    1 (rate t), -1 (rate t+1), 1 (taper t), -(1-a_i) (taper t+1), the last two for each line, 0.58 (target),
     then for each row r that i is in, ascending: s_r c_ri (sum t), -s_r c_ri (sum t+1)
 
 where "t" of the taper is there only for t >= 1, all of "t+1" only for t < T-1 and the target only for t = T-1.
@@ -48,6 +49,7 @@ class Layout:
     connectors: int
     steps: int
     sums: int  # rows of limits in each step
+    lines: int = 1  # of the taper
 
     @property
     def variables(self) -> int:
@@ -63,19 +65,19 @@ class Layout:
     def rate_row(self, connector: int, step: int) -> int:
         return connector * self.steps + step
 
-    def taper_row(self, connector: int, step: int) -> int:
+    def taper_row(self, connector: int, step: int, line: int = 0) -> int:
         """Step 0 has none: the energy before it is known, so that its taper is a bound of its rate row."""
-        return self.variables + connector * (self.steps - 1) + step - 1
+        return self.variables + (line * self.connectors + connector) * (self.steps - 1) + step - 1
 
     def target_row(self, connector: int) -> int:
-        return self.variables + self.connectors * (self.steps - 1) + connector
+        return self.variables + self.lines * self.connectors * (self.steps - 1) + connector
 
     def sum_row(self, number: int, step: int) -> int:
         return self.target_row(self.connectors) + number * self.steps + step
 
 
 def layout(station: Station) -> Layout:
-    return Layout(len(station.connectors), station.steps, len(planned_rows(station)))
+    return Layout(len(station.connectors), station.steps, len(planned_rows(station)), station.planning.taper_lines)
 
 
 def constraint_matrix(station: Station) -> sparse.csc_matrix:
@@ -91,9 +93,9 @@ def constraint_matrix(station: Station) -> sparse.csc_matrix:
                 entries.append((row, at.variable(i, t), factor))
                 if t > 0:
                     entries.append((row, at.variable(i, t - 1), -factor))
-            if t > 0:
-                entries.append((at.taper_row(i, t), at.variable(i, t), 1.0))
-                entries.append((at.taper_row(i, t), at.variable(i, t - 1), TAPER - 1.0))
+            for line in range(at.lines if t > 0 else 0):
+                entries.append((at.taper_row(i, t, line), at.variable(i, t), 1.0))
+                entries.append((at.taper_row(i, t, line), at.variable(i, t - 1), TAPER - 1.0))
         entries.append((at.target_row(i), at.variable(i, at.steps - 1), TARGET_FACTOR))
     return _csc(entries, (at.rows, at.variables))
 

@@ -17,6 +17,7 @@ from station_model import (
     MAX_OUTER_ITERATIONS,
     MAX_STEPS,
     MAX_SWITCH_s,
+    MAX_TAPER_LINES,
     MAX_TICK_ms,
     MAX_VOLTAGE_mV,
     MIN_SITE_VOLTAGE_mV,
@@ -107,6 +108,7 @@ def _planning(table: Table, steps: int) -> Fields:
         outer_iterations=_outer_iterations(table),
         on_events=_one_of(table, "replan", REPLANS) == "events",
         learns_taper=table.boolean("learn_taper", False),
+        taper_lines=table.integer("taper_lines", 1, MAX_TAPER_LINES) if table.has("taper_lines") else 1,
         lambda_milli_per_kWh2=table.quantity("lambda_per_kWh2", 0, MAX_LAMBDA_per_kWh2 * 1000, per_unit=1000, default=0),
     )
     if planning.objective == "log-utility" and not table.has("lambda_per_kWh2"):

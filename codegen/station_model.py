@@ -26,6 +26,7 @@ MAX_TICK_ms = 60_000
 MAX_REACTION_ms = 60_000
 
 MAX_OUTER_ITERATIONS = 20
+MAX_TAPER_LINES = 2  # EV_PARAM_B with D, and E
 MAX_LAMBDA_per_kWh2 = 10_000
 
 OBJECTIVES = ("throughput", "log-utility")  # taper_objective_t
@@ -86,6 +87,7 @@ class Planning:
     on_events: bool = False
     learns_taper: bool = False
     lambda_milli_per_kWh2: int = 0
+    taper_lines: int = 1
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,8 @@ def sizes_header(stations: list[Station], real: str) -> str:
 #define TAPER_MAX_GROUPS {max(len(station.groups) for station in stations)}
 /** Rows of a station's limits that the planner has (taper_row_is_planned), in every step. */
 #define TAPER_MAX_PLAN_ROWS {max(len(planned_rows(station)) for station in stations)}
+/** Lines of a vehicle's taper that a station plans with. */
+#define TAPER_MAX_TAPER_LINES {max(station.planning.taper_lines for station in stations)}
 
 /** Floating-point type of battery, horizon and planner: 1 double, 0 float. */
 #define TAPER_REAL_IS_DOUBLE {int(real == "double")}
@@ -109,6 +111,7 @@ def _planning(planning: Planning) -> str:
         "objective": f"TAPER_OBJECTIVE_{planning.objective.upper().replace('-', '_')}",
         "horizon_steps": planning.horizon_steps,
         "outer_iterations": planning.outer_iterations,
+        "taper_lines": planning.taper_lines,
         "on_events": _bool(planning.on_events),
         "learns_taper": _bool(planning.learns_taper),
         "lambda_milli_per_kWh2": planning.lambda_milli_per_kWh2,

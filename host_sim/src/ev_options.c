@@ -67,7 +67,7 @@ static const struct argp_option options[] = {
     {"price-csv", KEY_PRICE_CSV, "FILE", 0, "Price of energy over time (CSV, see below)", 0},
     {"connectors", KEY_CONNECTORS, "LIST", 0, "Play only these connectors (default: all)", 0},
     {"no-gateway", KEY_NO_GATEWAY, NULL, 0, "Play no energy gateway: no clock, no limit", 0},
-    {"no-taper", KEY_NO_TAPER, NULL, 0, "Keep the vehicles' taper back (EV_PARAM_D)", 0},
+    {"no-taper", KEY_NO_TAPER, NULL, 0, "Keep the vehicles' taper back (EV_PARAM_D and E)", 0},
     {"out", KEY_OUT, "DIR", 0,
      "Write the results to this directory, made if missing (default: only print a summary)", 0},
     {"seed", KEY_SEED, "N", 0, "Decides where the end-to-end counters begin (default: 0)", 0},

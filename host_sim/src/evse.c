@@ -83,7 +83,7 @@ double sim_evse_kw_per_A(const sim_evse_t *evse) {
 }
 
 double sim_evse_takes_kw(const sim_evse_t *evse) {
-    return fmax(evse->vehicle->max_kw - evse->vehicle->taper_kw * sim_evse_soc(evse), 0.0);
+    return sim_session_takes_kw(evse->vehicle, sim_evse_soc(evse));
 }
 
 bool sim_evse_hear(sim_evse_t *evse, const taper_frame_t *frame) {

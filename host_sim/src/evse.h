@@ -22,6 +22,7 @@ typedef enum {
     SIM_EV_PARAM_B,
     SIM_EV_PARAM_C,
     SIM_EV_PARAM_D,
+    SIM_EV_PARAM_E,
     SIM_EVSE_INFO,
     SIM_EVSE_FRAMES,
 } sim_evse_frame_t;
@@ -98,7 +99,8 @@ int32_t sim_evse_offered_mA(const sim_evse_t *evse, int32_t setpoint_mA);
 /** Draw what an offer allows, and at most `most_kw`: sets power and current. */
 void sim_evse_draw(sim_evse_t *evse, int32_t offered_mA, double most_kw);
 
-/** A frame with what it says now. All but SIM_EVSE_STATUS and SIM_EVSE_INFO need a vehicle. */
+/** A frame with what it says now. All but SIM_EVSE_STATUS and SIM_EVSE_INFO need a vehicle, SIM_EV_PARAM_E one with two
+    lines. */
 taper_message_t sim_evse_message(const sim_evse_t *evse, sim_evse_frame_t frame);
 
 /** The connector that a SETPOINT frame is for, or -1: another frame, or a node that the station does not have. */

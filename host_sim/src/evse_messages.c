@@ -39,8 +39,8 @@ static taper_message_t evse_status(const sim_evse_t *evse) {
 }
 
 static taper_message_t ev_status(const sim_evse_t *evse) {
-    // The limit of the on-board charger is flat: it says nothing about the taper of the battery.
-    const double max_mA = evse->vehicle->max_kw / sim_evse_kw_per_A(evse) * 1000.0;
+    // The limit of the charger is flat: it says nothing about the taper of the battery.
+    const double max_mA = sim_session_most_kw(evse->vehicle) / sim_evse_kw_per_A(evse) * 1000.0;
     return (taper_message_t){.kind = TAPER_MESSAGE_EV_STATUS,
                              .as.ev_status = {.soc_permille = soc_permille(sim_evse_soc(evse)),
                                               .soc_age_s = 0,
@@ -100,6 +100,14 @@ static taper_message_t ev_param_d(const sim_evse_t *evse) {
                                                .taper_W = nearest(evse->vehicle->taper_kw * 1000.0)}};
 }
 
+static taper_message_t ev_param_e(const sim_evse_t *evse) {
+    return (taper_message_t){.kind = TAPER_MESSAGE_EV_PARAM_E,
+                             .as.ev_param_e = {.revision = evse->revision,
+                                               .session = evse->session,
+                                               .peak_W = nearest(evse->vehicle->second_max_kw * 1000.0),
+                                               .taper_W = nearest(evse->vehicle->second_taper_kw * 1000.0)}};
+}
+
 static taper_message_t evse_info(const sim_evse_t *evse) {
     const taper_connector_config_t *config = evse->config;
     return (taper_message_t){.kind = TAPER_MESSAGE_EVSE_INFO,
@@ -115,8 +123,9 @@ static taper_message_t evse_info(const sim_evse_t *evse) {
 
 taper_message_t sim_evse_message(const sim_evse_t *evse, sim_evse_frame_t frame) {
     typedef taper_message_t (*message_t)(const sim_evse_t *);
-    static const message_t messages[SIM_EVSE_FRAMES] = {evse_status, ev_status,  evse_elec,  ev_param_a,
-                                                        ev_param_b,  ev_param_c, ev_param_d, evse_info};
+    static const message_t messages[SIM_EVSE_FRAMES] = {evse_status, ev_status,  evse_elec,
+                                                        ev_param_a,  ev_param_b, ev_param_c,
+                                                        ev_param_d,  ev_param_e, evse_info};
     taper_message_t message = messages[frame](evse);
     message.bus = evse->config->bus;
     message.node = evse->config->node;

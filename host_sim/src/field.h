@@ -48,7 +48,7 @@ typedef struct {
     uint32_t
         vehicle_delay_ms; /**< on the bus's clock: from a change of the offer until the vehicle follows */
     uint32_t grace_ms;    /**< for sim_tracker_init(); 0: SIM_GRACE_ms */
-    bool tells_taper;     /**< EV_PARAM_D is sent */
+    bool tells_taper;     /**< EV_PARAM_D and E are sent */
     bool no_gateway;      /**< not played here: only the station's own limits can be held against then */
     uint64_t seed;        /**< bits of it begin the end-to-end counters */
 } sim_field_options_t;

@@ -21,6 +21,7 @@ static const sim_cycle_t cycles[SIM_EVSE_FRAMES] = {
     [SIM_EV_PARAM_B] = {TAPER_EV_PARAM_B_CYCLE_ms, 0},
     [SIM_EV_PARAM_C] = {TAPER_EV_PARAM_C_CYCLE_ms, 0},
     [SIM_EV_PARAM_D] = {TAPER_EV_PARAM_D_CYCLE_ms, 0},
+    [SIM_EV_PARAM_E] = {TAPER_EV_PARAM_E_CYCLE_ms, 0},
     [SIM_EVSE_INFO] = {TAPER_EVSE_INFO_CYCLE_ms, 0},
 };
 static const sim_cycle_t time_cycle = {TAPER_TIME_SYNC_CYCLE_ms, 0};
@@ -72,7 +73,7 @@ static uint32_t key_of(const sim_evse_t *evse, sim_evse_frame_t frame) {
         return session | (uint32_t)(message.as.evse_elec.energy_Wh / ENERGY_STEP_WH);
     }
     case SIM_EVSE_INFO: return 1;
-    default: return session | evse->revision; // EV_PARAM_A..D
+    default: return session | evse->revision; // EV_PARAM_A..E
     }
 }
 
@@ -80,7 +81,10 @@ static bool is_said(const sim_field_t *field, const sim_evse_t *evse, unsigned f
     if (frame == SIM_EVSE_STATUS || frame == SIM_EVSE_INFO) {
         return true;
     }
-    return evse->vehicle != NULL && (frame != SIM_EV_PARAM_D || field->options.tells_taper);
+    if (evse->vehicle == NULL || (frame == SIM_EV_PARAM_E && evse->vehicle->second_max_kw <= 0.0)) {
+        return false;
+    }
+    return (frame != SIM_EV_PARAM_D && frame != SIM_EV_PARAM_E) || field->options.tells_taper;
 }
 
 static void send_connector(sim_field_t *field, unsigned connector) {

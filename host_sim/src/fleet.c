@@ -28,9 +28,12 @@ static bool send_first(sim_fleet_t *fleet, sim_evse_t *evse, unsigned count) {
 
 bool sim_fleet_report(sim_fleet_t *fleet, unsigned connector) {
     sim_evse_t *evse = &fleet->evse[connector];
-    // Without a vehicle the heartbeat alone; EV_PARAM_D, the last, only where the taper is told.
-    const unsigned present = fleet->tells_taper ? SIM_EV_PARAM_D + 1 : SIM_EV_PARAM_D;
-    return send_first(fleet, evse, evse->vehicle == NULL ? SIM_EVSE_STATUS + 1 : present);
+    unsigned count = SIM_EVSE_STATUS + 1; // without a vehicle the heartbeat alone
+    if (evse->vehicle != NULL) {
+        const unsigned lines = !fleet->tells_taper ? 0 : evse->vehicle->second_max_kw > 0.0 ? 2 : 1;
+        count = SIM_EV_PARAM_D + lines; // EV_PARAM_D and E, the last, have a line each
+    }
+    return send_first(fleet, evse, count);
 }
 
 bool sim_fleet_echo(sim_fleet_t *fleet, unsigned connector, bool whole) {

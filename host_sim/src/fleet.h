@@ -19,8 +19,9 @@ typedef struct {
     const taper_station_config_t *station;
     const taper_port_t *port;
     double tick_s;
-    bool tells_taper; /**< EV_PARAM_D is sent; without it the station plans as if there were no taper */
-    double begin_s;   /**< of the present tick */
+    bool
+        tells_taper; /**< EV_PARAM_D and E are sent; without them the station plans as if there were no taper */
+    double begin_s;                           /**< of the present tick */
     double takes_kw[TAPER_MAX_CONNECTORS];    /**< most that the vehicle takes in it */
     int32_t offered_mA[TAPER_MAX_CONNECTORS]; /**< what it draws by; negative: it has yet to begin */
     sim_evse_t evse[TAPER_MAX_CONNECTORS];

@@ -36,6 +36,9 @@ void sim_problems_add(FILE *file, const taper_station_t *station) {
             write_phases(file, station, i);
             fprintf(file, "\n");
         }
+        if (d->active && d->second_peak_W > 0) {
+            fprintf(file, "second %u %ld %ld\n", i, (long)d->second_peak_W, (long)d->second_taper_W);
+        }
     }
     fprintf(file, "solve\n");
 }

@@ -1,5 +1,6 @@
 #include "sessions.h"
 
+#include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -19,16 +20,27 @@ enum {
     COLUMN_TAPER,
     COLUMN_TOLD,
     COLUMN_PHASES,
+    COLUMN_SECOND_MAX,
+    COLUMN_SECOND_TAPER,
+    COLUMN_CURVE,
     COLUMN_COUNT
 };
 
 static const sim_column_t columns[COLUMN_COUNT] = {
-    [COLUMN_ID] = {"session_id", true},         [COLUMN_CONNECTOR] = {"connector", true},
-    [COLUMN_ARRIVAL] = {"arrival_s", true},     [COLUMN_DEPARTURE] = {"departure_s", true},
-    [COLUMN_BATTERY] = {"battery_kwh", true},   [COLUMN_SOC_ARRIVAL] = {"soc_arrival", true},
-    [COLUMN_SOC_TARGET] = {"soc_target", true}, [COLUMN_MAX_POWER] = {"max_kw", true},
-    [COLUMN_TAPER] = {"taper_kw", true},        [COLUMN_TOLD] = {"expected_departure_s", false},
+    [COLUMN_ID] = {"session_id", true},
+    [COLUMN_CONNECTOR] = {"connector", true},
+    [COLUMN_ARRIVAL] = {"arrival_s", true},
+    [COLUMN_DEPARTURE] = {"departure_s", true},
+    [COLUMN_BATTERY] = {"battery_kwh", true},
+    [COLUMN_SOC_ARRIVAL] = {"soc_arrival", true},
+    [COLUMN_SOC_TARGET] = {"soc_target", true},
+    [COLUMN_MAX_POWER] = {"max_kw", true},
+    [COLUMN_TAPER] = {"taper_kw", true},
+    [COLUMN_TOLD] = {"expected_departure_s", false},
     [COLUMN_PHASES] = {"phases", false},
+    [COLUMN_SECOND_MAX] = {"second_max_kw", false},
+    [COLUMN_SECOND_TAPER] = {"second_taper_kw", false},
+    [COLUMN_CURVE] = {"curve", false},
 };
 
 /** Times are carried in TIME_SYNC as 32-bit seconds; a time from 1970 on fits. */
@@ -121,6 +133,52 @@ static bool read_times(const row_t *row, sim_session_t *session) {
            sim_table_error(row->table, row->row, told, "before arrival_s");
 }
 
+/** Text of an optional column; empty if there is none. */
+static const char *optional_cell(const row_t *row, int column) {
+    const size_t index = row->index[column];
+    return index == SIM_NO_COLUMN ? "" : sim_table_cell(row->table, row->row, index);
+}
+
+/** A line of the taper: power at SOC 0, and its fall until SOC 1. */
+static bool read_line(const row_t *row, int max_column, int taper_column, double *max_kw, double *taper_kw) {
+    const size_t taper = row->index[taper_column];
+    if (!read_positive(row, max_column, MOST_ON_THE_BUS, max_kw) ||
+        !sim_table_number(row->table, row->row, taper, taper_kw)) {
+        return false;
+    }
+    if (*taper_kw < 0.0) {
+        return sim_table_error(row->table, row->row, taper, "below 0");
+    }
+    return *taper_kw <= *max_kw ||
+           sim_table_error(row->table, row->row, taper, "above %s", columns[max_column].name);
+}
+
+/** Both columns of the second line, or neither. */
+static bool read_second_line(const row_t *row, sim_session_t *session) {
+    const bool has_max = optional_cell(row, COLUMN_SECOND_MAX)[0] != '\0';
+    const bool has_taper = optional_cell(row, COLUMN_SECOND_TAPER)[0] != '\0';
+    if (has_max != has_taper) {
+        const int given = has_max ? COLUMN_SECOND_MAX : COLUMN_SECOND_TAPER;
+        const int missing = has_max ? COLUMN_SECOND_TAPER : COLUMN_SECOND_MAX;
+        return sim_table_error(row->table, row->row, row->index[given], "given without %s",
+                               columns[missing].name);
+    }
+    return !has_max || read_line(row, COLUMN_SECOND_MAX, COLUMN_SECOND_TAPER, &session->second_max_kw,
+                                 &session->second_taper_kw);
+}
+
+static bool read_curve(const row_t *row, sim_charge_curve_t *curve) {
+    const char *cell = optional_cell(row, COLUMN_CURVE);
+    unsigned at = 0;
+    const char *reason = cell[0] == '\0' ? NULL : sim_charge_curve_read(curve, cell, MOST_ON_THE_BUS, &at);
+    if (reason == NULL) {
+        return true;
+    }
+    const size_t column = row->index[COLUMN_CURVE];
+    return at == 0 ? sim_table_error(row->table, row->row, column, "%s", reason)
+                   : sim_table_error(row->table, row->row, column, "point %u: %s", at, reason);
+}
+
 static bool read_vehicle(const row_t *row, sim_session_t *session) {
     if (!read_positive(row, COLUMN_BATTERY, MOST_ON_THE_BUS, &session->battery_kwh) ||
         !read_range(row, COLUMN_SOC_ARRIVAL, 0.0, 1.0, &session->soc_arrival) ||
@@ -130,20 +188,13 @@ static bool read_vehicle(const row_t *row, sim_session_t *session) {
     if (session->soc_target < session->soc_arrival) {
         return sim_table_error(row->table, row->row, row->index[COLUMN_SOC_TARGET], "below soc_arrival");
     }
-    if (!read_positive(row, COLUMN_MAX_POWER, MOST_ON_THE_BUS, &session->max_kw) ||
-        !sim_table_number(row->table, row->row, row->index[COLUMN_TAPER], &session->taper_kw)) {
-        return false;
-    }
-    if (session->taper_kw < 0.0) {
-        return sim_table_error(row->table, row->row, row->index[COLUMN_TAPER], "below 0");
-    }
-    return session->taper_kw <= session->max_kw ||
-           sim_table_error(row->table, row->row, row->index[COLUMN_TAPER], "above max_kw");
+    return read_line(row, COLUMN_MAX_POWER, COLUMN_TAPER, &session->max_kw, &session->taper_kw) &&
+           read_second_line(row, session) && read_curve(row, &session->curve);
 }
 
 static bool read_phases(const row_t *row, uint8_t *phases) {
     const size_t column = row->index[COLUMN_PHASES];
-    const char *cell = column == SIM_NO_COLUMN ? "" : sim_table_cell(row->table, row->row, column);
+    const char *cell = optional_cell(row, COLUMN_PHASES);
     unsigned count = 0;
     *phases = 0;
     if (cell[0] == '\0') {
@@ -209,6 +260,23 @@ static bool read_rows(row_t *row, sim_sessions_t *sessions) {
         sessions->count++;
     }
     return ids_differ(row, sessions);
+}
+
+/** What the lines that it tells allow. */
+static double told_kw(const sim_session_t *session, double soc) {
+    double power_kw = session->max_kw - session->taper_kw * soc;
+    if (session->second_max_kw > 0.0) {
+        power_kw = fmin(power_kw, session->second_max_kw - session->second_taper_kw * soc);
+    }
+    return fmax(power_kw, 0.0);
+}
+
+double sim_session_takes_kw(const sim_session_t *session, double soc) {
+    return session->curve.count > 0 ? sim_charge_curve_kw(&session->curve, soc) : told_kw(session, soc);
+}
+
+double sim_session_most_kw(const sim_session_t *session) {
+    return session->curve.count > 0 ? sim_charge_curve_most_kw(&session->curve) : told_kw(session, 0.0);
 }
 
 bool sim_sessions_load(sim_sessions_t *sessions, const char *file, unsigned connectors) {

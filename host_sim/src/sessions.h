@@ -6,7 +6,12 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/** One visit of one vehicle. Its maximum power is max_kw - taper_kw * SOC, never below 0. */
+#include "charge_curve.h"
+
+/**
+ * One visit of one vehicle. It tells that it takes at most max_kw - taper_kw * SOC and, if it has a second line, at most
+ * second_max_kw - second_taper_kw * SOC; never below 0. That is so unless it has a curve, which it then obeys instead.
+ */
 typedef struct {
     char *id;
     unsigned connector; /**< 1..connectors of the station; 0: the first free one */
@@ -17,8 +22,11 @@ typedef struct {
     double soc_arrival; /**< 0..1 */
     double soc_target;  /**< soc_arrival..1 */
     double max_kw;
-    double taper_kw; /**< 0..max_kw */
-    uint8_t phases;  /**< that its charger uses, 1 or 3; 0: all that the connector has */
+    double taper_kw;        /**< 0..max_kw */
+    double second_max_kw;   /**< 0: there is no second line */
+    double second_taper_kw; /**< 0..second_max_kw */
+    sim_charge_curve_t curve;
+    uint8_t phases; /**< that its charger uses, 1 or 3; 0: all that the connector has */
 } sim_session_t;
 
 typedef struct {
@@ -30,6 +38,12 @@ typedef struct {
 static inline double sim_session_request_kwh(const sim_session_t *session) {
     return (session->soc_target - session->soc_arrival) * session->battery_kwh;
 }
+
+/** Most that the vehicle takes at `soc`, >= 0 [kW]. */
+double sim_session_takes_kw(const sim_session_t *session, double soc);
+
+/** Most that it takes at any SOC: the flat limit that it tells (EV_STATUS) [kW]. */
+double sim_session_most_kw(const sim_session_t *session);
 
 /**
  * Read a sessions file for a station with `connectors` connectors.

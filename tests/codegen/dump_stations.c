@@ -24,9 +24,9 @@ static void print_station(const taper_station_config_t *s) {
            (unsigned long)s->min_off_ms, (unsigned long)s->turn_ms, (unsigned long)s->change_ms);
     printf(" %ld %ld %ld %d %d %d\n", (long)s->ramp_mA_per_s, (long)s->deadband_mA,
            (long)s->price_weight_permille, s->line_to_line, s->step_s, s->steps);
-    printf("planning %d %d %d %d %d %ld\n", s->planning.objective, s->planning.horizon_steps,
-           s->planning.outer_iterations, s->planning.on_events, s->planning.learns_taper,
-           (long)s->planning.lambda_milli_per_kWh2);
+    printf("planning %d %d %d %d %d %d %ld\n", s->planning.objective, s->planning.horizon_steps,
+           s->planning.outer_iterations, s->planning.taper_lines, s->planning.on_events,
+           s->planning.learns_taper, (long)s->planning.lambda_milli_per_kWh2);
     for (unsigned k = 0; k < s->group_count; k++) {
         print_group(&s->groups[k]);
     }

@@ -23,6 +23,7 @@ outer_iterations = 4
 horizon_steps = 3
 replan = "events"
 learn_taper = true
+taper_lines = 2
 [site]
 failsafe_kW = 20.0
 other_load_kW = 40.0

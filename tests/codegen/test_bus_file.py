@@ -173,4 +173,4 @@ def test_generating_from_a_bad_description_writes_nothing(generate: Run, tmp_pat
 
 
 def test_the_description_of_the_repository_is_good() -> None:
-    assert len(read_bus(CODEGEN / "bus.toml").messages) == 19
+    assert len(read_bus(CODEGEN / "bus.toml").messages) == 20

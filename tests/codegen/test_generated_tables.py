@@ -67,7 +67,7 @@ def expected_station(station: dict) -> str:
 
 def expected_planning(planning: dict) -> str:
     objective = ("throughput", "log-utility").index(planning.get("objective", "throughput"))
-    counts = planning.get("horizon_steps", 0), planning.get("outer_iterations", 0)
+    counts = planning.get("horizon_steps", 0), planning.get("outer_iterations", 0), planning.get("taper_lines", 1)
     switches = planning.get("replan") == "events", planning.get("learn_taper", False)
     return line("planning", objective, *counts, *switches, thousandths(planning, "lambda_per_kWh2"))
 
@@ -99,13 +99,14 @@ def tables_of(generate: Run, text: str, folder: Path) -> list[str]:
 
 def test_groups_are_sorted_and_what_is_left_out_has_its_default(generate: Run, tmp_path: Path) -> None:
     lines = tables_of(generate, GOOD, tmp_path)
-    assert lines[:4] == [
+    assert lines[:5] == [
         "x 4200 0 0 230000 1000 300000 300000 900000 5000 0 0 0 0 900 4",
+        "planning 0 0 0 1 0 0 0",
         "group 110000 0 0 0 255",
         "group 66000 0 0 0 0",
         "group 20000 0 0 0 1",
     ]
-    assert lines[4] == "connector 6000 32000 0 230000 5000 1000 3 1 0 2 0 1 0"
+    assert lines[5] == "connector 6000 32000 0 230000 5000 1000 3 1 0 2 0 1 0"
     assert lines[-1] == "connector 0 125500 0 400000 1000 950 1 1 0 0 1 2 1"
 
 
@@ -113,6 +114,7 @@ def test_every_quantity_of_a_file_reaches_its_place(generate: Run, tmp_path: Pat
     lines = tables_of(generate, WIRED, tmp_path)
     assert lines == [
         "x 20000 40000 120000 120000 1000 300000 240000 600000 7500 1500 300 250 1 900 4",
+        "planning 1 3 4 2 1 1 12500",
         "group 150000 416600 0 0 255",
         "group 0 200000 722000 20000 0",
         "connector 6000 32000 6000 120000 5000 1000 3 5 0 1 0 1 0",

@@ -8,6 +8,7 @@ import pytest
 import qp
 from rows import planned_rows
 from station import Connector, Group, Station
+from station_model import Planning
 
 N, T = 3, 3
 
@@ -59,6 +60,20 @@ def test_entries_stand_in_the_order_that_the_firmware_writes(station: Station) -
     assert columns[1] == pytest.approx([1, -1, 1, -keep, s, -s, f, -f])
     assert columns[2] == pytest.approx([1, 1, 0.58, s, f])  # last step
     assert columns[8] == pytest.approx([1, 1, 0.58, s])  # connector 2 is not on the feeder
+
+
+def test_second_lines_follow_on_the_first_ones(station: Station) -> None:
+    two = replace(station, planning=Planning(taper_lines=2))
+    a = qp.constraint_matrix(two)
+    assert a.shape == (9 + 6 + 6 + 3 + 6, 9)
+    one = qp.constraint_matrix(station).toarray()
+    tapers = one[9:15]
+    assert np.array_equal(a.toarray(), np.vstack([one[:15], tapers, one[15:]]))
+    columns = [a.data[a.indptr[k] : a.indptr[k + 1]].tolist() for k in range(9)]
+    s, f, keep = sqrt(5 / 3), sqrt(5 / 2), 0.97
+    assert columns[0] == pytest.approx([1, -1, -keep, -keep, s, -s, f, -f])
+    assert columns[1] == pytest.approx([1, -1, 1, -keep, 1, -keep, s, -s, f, -f])
+    assert columns[2] == pytest.approx([1, 1, 1, 0.58, s, f])
 
 
 def test_the_cost_is_that_of_the_discounted_power(station: Station) -> None:

@@ -39,6 +39,7 @@ MISTAKES = {
     "no outer iteration": ("outer_iterations = 4", "outer_iterations = 0", "planning.outer_iterations", "must be 1 to 20"),
     "horizon beyond the steps": ("horizon_steps = 3", "horizon_steps = 5", "planning.horizon_steps", "must be 2 to 4, not 5"),
     "unknown rule of planning anew": ('"events"', '"always"', "planning.replan", '"always" is not one of steps, events'),
+    "three lines of a taper": ("taper_lines = 2", "taper_lines = 3", "planning.taper_lines", "must be 1 to 2, not 3"),
     "planning is a value": ("[planning]", "planning = 1\n[other]", "control.planning", "unknown key"),
     "failsafe above the site": (
         "failsafe_kW = 20.0",

@@ -103,6 +103,12 @@ static void check_param_d(const taper_ev_param_d_t *d) {
     in_range_or_absent("EV_PARAM_D.taper_W", d->taper_W, 0, 655340);
 }
 
+static void check_param_e(const taper_ev_param_e_t *e) {
+    in_range("EV_PARAM_E.revision", e->revision, 0, 15);
+    in_range_or_absent("EV_PARAM_E.peak_W", e->peak_W, 0, 655340);
+    in_range_or_absent("EV_PARAM_E.taper_W", e->taper_W, 0, 655340);
+}
+
 static void check_site_meter(const taper_site_meter_t *meter) {
     for (int k = 0; k < 3; k++) {
         in_range_or_absent("SITE_METER.other_mA", meter->other_mA[k], -3276700, 3276700);
@@ -145,6 +151,7 @@ void check_message(const taper_message_t *message) {
     case TAPER_MESSAGE_EV_PARAM_B: check_param_b(&message->as.ev_param_b); break;
     case TAPER_MESSAGE_EV_PARAM_C: check_param_c(&message->as.ev_param_c); break;
     case TAPER_MESSAGE_EV_PARAM_D: check_param_d(&message->as.ev_param_d); break;
+    case TAPER_MESSAGE_EV_PARAM_E: check_param_e(&message->as.ev_param_e); break;
     case TAPER_MESSAGE_EVSE_INFO: check_evse_info(&message->as.evse_info); break;
     case TAPER_MESSAGE_PLAN: check_plan(&message->as.plan); break;
     case TAPER_MESSAGE_OUTLOOK: check_outlook(&message->as.outlook); break;

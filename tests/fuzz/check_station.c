@@ -12,7 +12,7 @@ static void check_as(taper_message_kind_t kind, const taper_message_t *message) 
     check_message(&copy);
 }
 
-/** `seen`: bit 0 for A .. bit 3 for D. What was not received yet is zero, and zero is no capacity. */
+/** `seen`: bit 0 for A .. bit 4 for E. What was not received yet is zero, and zero is no capacity. */
 static void check_params(const taper_ev_params_t *params, unsigned seen) {
     taper_message_t message;
     if ((seen & 0x1u) != 0) {
@@ -31,6 +31,10 @@ static void check_params(const taper_ev_params_t *params, unsigned seen) {
         message.as.ev_param_d = params->d;
         check_as(TAPER_MESSAGE_EV_PARAM_D, &message);
     }
+    if ((seen & 0x10u) != 0) {
+        message.as.ev_param_e = params->e;
+        check_as(TAPER_MESSAGE_EV_PARAM_E, &message);
+    }
 }
 
 static void check_session(const taper_session_t *session) {
@@ -46,7 +50,7 @@ static void check_session(const taper_session_t *session) {
     check_params(&session->received, session->param_seen);
     check_that(!session->in_session || session->vehicle_there, "session without a vehicle", 1);
     if (session->in_session) {
-        check_params(&session->used, 0xFu);
+        check_params(&session->used, 0x1Fu);
     }
     check_that(session->session_Wh == TAPER_ABSENT ||
                    (session->session_Wh >= 0 && session->session_Wh <= 655340),

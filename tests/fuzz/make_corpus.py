@@ -22,6 +22,7 @@ FUNCTIONS = {
     "ev_status": (0x05, 1), "evse_elec": (0x06, 1), "site_meter": (0x07, GATEWAY), "time_sync": (0x08, GATEWAY),
     "ctrl_status": (0x09, 0), "ev_param_a": (0x0A, 1), "ev_param_b": (0x0B, 1), "ev_param_c": (0x0C, 1),
     "evse_info": (0x0D, 1), "plan": (0x0E, 1), "ctrl_diag": (0x0F, 0), "ev_param_d": (0x10, 1),
+    "ev_param_e": (0x12, 1),
 }  # fmt: skip
 ISOTP_FROM = 0x19
 
@@ -192,7 +193,7 @@ EDGES = {
     "gateway": "site_limit site_meter time_sync",
     "evse": "evse_status evse_elec evse_info emcy",
     "ev-status": "ev_status",
-    "ev-param": "ev_param_a ev_param_b ev_param_c ev_param_d",
+    "ev-param": "ev_param_a ev_param_b ev_param_c ev_param_d ev_param_e",
     "controller": "setpoint ctrl_status plan ctrl_diag",
 }
 

@@ -9,6 +9,8 @@
  *     limit W0 .. W(T-1)
  *     phases mA mA mA             what other load leaves on each; as described if not given
  *     demand CONNECTOR SESSION stored_Wh capacity_Wh need_Wh peak_W taper_W max_mA W_per_A departs_in_s [PHASES]
+ *     second CONNECTOR peak_W taper_W
+ *                                 of the demand before: another line of its taper; none if not given
  *     solve
  *
  * `solve` prints "VERDICT ITERATIONS MICROSECONDS" and then T planned powers (per unit) a line for every connector. With
@@ -109,6 +111,16 @@ static void read_demand(const char *line) {
     snapshot.demand[i] = d;
 }
 
+static void read_second(const char *line) {
+    int i = 0, peak_W = 0, taper_W = 0;
+    if (sscanf(line, "second %d %d %d", &i, &peak_W, &taper_W) != 3 || i < 0 ||
+        i >= config->connector_count) {
+        fail(line);
+    }
+    snapshot.demand[i].second_peak_W = peak_W;
+    snapshot.demand[i].second_taper_W = taper_W;
+}
+
 static double now_us(void) {
     struct timespec now;
     clock_gettime(CLOCK_MONOTONIC, &now);
@@ -133,11 +145,14 @@ static void print_reals(const taper_real_t *values, unsigned count) {
 
 static void print_numbers(void) {
     const unsigned variables = (unsigned)config->connector_count * config->steps;
-    const unsigned rows = 2 * variables + (unsigned)planner.horizon.sum_count * config->steps;
+    const unsigned sums = (unsigned)planner.horizon.sum_count * config->steps;
+    const unsigned rows = (unsigned)taper_first_sum_row(config) + sums;
     print_reals(planner.horizon.linear, variables);
     print_reals(planner.horizon.lower, rows);
     print_reals(planner.horizon.upper, rows);
-    print_reals(planner.horizon.taper_keep, config->connector_count);
+    for (uint8_t line = 0; line < taper_lines_planned(config); line++) {
+        print_reals(planner.horizon.taper_keep[line], config->connector_count);
+    }
 }
 
 static void solve(bool numbers) {
@@ -176,6 +191,8 @@ int main(int argc, char **argv) {
             read_phases(line);
         } else if (strncmp(line, "demand", 6) == 0) {
             read_demand(line);
+        } else if (strncmp(line, "second", 6) == 0) {
+            read_second(line);
         } else if (strncmp(line, "solve", 5) == 0) {
             solve(numbers);
         } else {

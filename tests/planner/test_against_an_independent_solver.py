@@ -27,7 +27,7 @@ LATE, MOST_LATE = 4, 3  # of all problems below, in single precision
 BINDS = 2e-3  # what a limit that matters costs at least, whatever the planner's precision
 late: list[str] = []
 STATIONS = ["hub", "garage", "paper", "depot", "caltech"]
-SPECIAL = ["mixed"]
+SPECIAL = ["mixed", "tapered"]
 SPECIAL_STATIONS = Path(__file__).resolve().parent / "stations"
 
 
@@ -164,6 +164,52 @@ def test_every_wiring_below_every_kind_of_limit(occupied: float, share: float) -
     rng = random.Random(f"{station.name} {occupied} {share}")
     demands = fleet(rng, station, max(1, int(station.connectors * occupied)))
     assert_agrees(station, demands, share_of_peaks(station, demands, share))
+
+
+def fast_vehicle(rng: random.Random) -> Demand:
+    """Flat, tapered, and steeper near the end, to 10 %; as steep as real curves are (host_sim/data), and somewhat more."""
+    capacity_Wh, stored = rng.choice([30_000, 60_000, 90_000]), rng.uniform(0.1, 0.9)
+    most_W = min(capacity_Wh * rng.uniform(1.0, 2.5), 150_000)
+    first_W = rng.uniform(0.4, 0.9) * most_W  # taper of the first line
+    second_W = rng.uniform(1.5, 4.0) * most_W
+    return Demand(
+        stored_Wh=int(capacity_Wh * stored),
+        capacity_Wh=capacity_Wh,
+        need_Wh=int(capacity_Wh * (1 - stored) * rng.uniform(0.3, 1)),
+        peak_W=int(most_W + 0.3 * first_W),
+        taper_W=int(first_W),
+        second_peak_W=int(0.1 * most_W + second_W),
+        second_taper_W=int(second_W),
+        departs_in_s=rng.randrange(900, 5_400),
+    )
+
+
+@pytest.mark.parametrize("share", [0.1, 0.3, 0.7, 1.5])
+@pytest.mark.parametrize("occupied", [1, 3, 6])
+def test_curves_of_three_pieces(occupied: int, share: float) -> None:
+    station = read_station("tapered", SPECIAL_STATIONS)
+    rng = random.Random(f"tapered {occupied} {share}")
+    demands = {i: fast_vehicle(rng) for i in rng.sample(range(station.connectors), occupied)}
+    assert_agrees(station, demands, [int(share * 100_000 * occupied)] * station.steps)
+
+
+def test_where_the_second_line_matters_the_plan_is_another_without_it() -> None:
+    station = read_station("tapered", SPECIAL_STATIONS)
+    rng = random.Random("second line")
+    demands = {i: replace(fast_vehicle(rng), departs_in_s=5_400) for i in range(station.connectors)}
+    limit_W = [250_000] * station.steps
+    best = Problem(station, demands, limit_W).least_cost()
+    single = {i: replace(d, second_peak_W=0) for i, d in demands.items()}
+    assert Problem(station, single, limit_W).least_cost() < best - BINDS * abs(best)
+    assert_agrees(station, demands, limit_W)
+
+
+def test_of_some_vehicles_one_line_is_known_of_others_two() -> None:
+    station = read_station("tapered", SPECIAL_STATIONS)
+    rng = random.Random("one and two")
+    demands = {i: fast_vehicle(rng) for i in range(station.connectors)}
+    demands = {i: replace(d, second_peak_W=0) if i % 2 else d for i, d in demands.items()}
+    assert_agrees(station, demands, [200_000] * station.steps)
 
 
 @pytest.mark.parametrize("name", ["hub", "depot"])

@@ -13,7 +13,7 @@ import pytest
 REQUIRED = ("session_id", "connector", "arrival_s", "departure_s", "battery_kwh", "soc_arrival", "soc_target",
             "max_kw", "taper_kw")
 TOLD = "expected_departure_s"
-OPTIONAL = (TOLD, "phases")
+OPTIONAL = (TOLD, "phases", "second_max_kw", "second_taper_kw", "curve")
 
 
 def session(session_id, **changed):

@@ -29,21 +29,62 @@ static void test_the_limit_is_never_negative(void) {
     TEST_ASSERT_EQUAL_INT32(0, taper_battery_limit_W(&demand));
 }
 
-static void test_the_limit_that_the_planner_takes_is_not_in_whole_watts(void) {
+static void test_the_limits_that_the_planner_takes_are_not_in_whole_watts(void) {
     taper_demand_t demand = tapered(59996);
-    TEST_ASSERT_EQUAL_INT32(1361, taper_battery_limit_W(&demand));
-    TEST_ASSERT_FLOAT_WITHIN(0.01F, 1360.4F, (float)taper_battery_limit_now_W(&demand));
+    demand.second_peak_W = 20000;
+    demand.second_taper_W = 19999;
+    TEST_ASSERT_EQUAL_INT32(3, taper_battery_limit_W(&demand));
+    TEST_ASSERT_FLOAT_WITHIN(0.01F, 1360.4F, (float)taper_battery_line_now_W(&demand, 0));
+    TEST_ASSERT_FLOAT_WITHIN(0.02F, 2.33F, (float)taper_battery_line_now_W(&demand, 1));
     demand.taper_W = 7360;
     demand.stored_Wh = 90000;
-    TEST_ASSERT_TRUE(taper_battery_limit_now_W(&demand) == 0);
+    TEST_ASSERT_TRUE(taper_battery_line_now_W(&demand, 0) == 0);
+}
+
+static taper_demand_t of_two_lines(int32_t stored_Wh) {
+    taper_demand_t demand = tapered(stored_Wh); /* 7360 - 6000 SOC */
+    demand.second_peak_W = 20000;
+    demand.second_taper_W = 19800; /* they cross at SOC 0.9159 */
+    return demand;
+}
+
+static void test_of_two_lines_the_lower_one_counts(void) {
+    const taper_demand_t empty = of_two_lines(0);
+    const taper_demand_t before = of_two_lines(54000); /* 0.9: 1960 and 2180 */
+    const taper_demand_t behind = of_two_lines(57000); /* 0.95: 1660 and 1190 */
+    const taper_demand_t full = of_two_lines(60000);
+    TEST_ASSERT_EQUAL_INT32(7360, taper_battery_limit_W(&empty));
+    TEST_ASSERT_EQUAL_INT32(1960, taper_battery_limit_W(&before));
+    TEST_ASSERT_EQUAL_INT32(1190, taper_battery_limit_W(&behind));
+    TEST_ASSERT_EQUAL_INT32(200, taper_battery_limit_W(&full));
+    TEST_ASSERT_EQUAL_INT32(1190, taper_battery_useful_W(&behind, 1000));
+}
+
+static void test_each_line_by_itself(void) {
+    const taper_demand_t demand = of_two_lines(54000);
+    const taper_demand_t one = tapered(54000);
+    TEST_ASSERT_FLOAT_WITHIN(0.01F, 1960, (float)taper_battery_line_now_W(&demand, 0));
+    TEST_ASSERT_FLOAT_WITHIN(0.01F, 2180, (float)taper_battery_line_now_W(&demand, 1));
+    TEST_ASSERT_TRUE(taper_battery_line_now_W(&one, 1) >= TAPER_REAL_UNBOUNDED);
+    const taper_real_t per_mille = taper_battery_slope_per_h(&demand, 1) * 1000; /* 19.8 kW over 60 kWh */
+    TEST_ASSERT_TRUE(per_mille > (taper_real_t)329.9 && per_mille < (taper_real_t)330.1);
+}
+
+static void test_a_line_may_begin_above_what_connector_and_vehicle_allow(void) {
+    taper_demand_t demand = of_two_lines(12000); /* 0.2 */
+    demand.peak_W = 100000;
+    demand.taper_W = 90000;
+    TEST_ASSERT_EQUAL_INT32(7360, taper_battery_useful_W(&demand, 1000));
+    demand.stored_Wh = 58800; /* 0.98: 11800 and 596 */
+    TEST_ASSERT_EQUAL_INT32(596, taper_battery_useful_W(&demand, 1000));
 }
 
 static void test_an_unknown_capacity_means_no_taper(void) {
     taper_demand_t demand = tapered(30000);
     demand.capacity_Wh = 0;
     TEST_ASSERT_EQUAL_INT32(7360, taper_battery_limit_W(&demand));
-    TEST_ASSERT_TRUE(taper_battery_limit_now_W(&demand) == 7360);
-    TEST_ASSERT_TRUE(taper_battery_slope_per_h(&demand) == 0);
+    TEST_ASSERT_TRUE(taper_battery_line_now_W(&demand, 0) == 7360);
+    TEST_ASSERT_TRUE(taper_battery_slope_per_h(&demand, 0) == 0);
 }
 
 static void test_useful_power_is_bounded_by_connector_taper_and_need(void) {
@@ -65,7 +106,7 @@ static void test_nothing_is_useful_for_an_inactive_demand(void) {
 
 static void test_the_slope_is_the_taper_over_the_capacity(void) {
     const taper_demand_t demand = tapered(30000);
-    const taper_real_t per_mille = taper_battery_slope_per_h(&demand) * 1000;
+    const taper_real_t per_mille = taper_battery_slope_per_h(&demand, 0) * 1000;
     TEST_ASSERT_TRUE(per_mille > (taper_real_t)99.99 && per_mille < (taper_real_t)100.01);
 }
 
@@ -98,7 +139,10 @@ int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_the_limit_falls_on_a_line_from_the_peak);
     RUN_TEST(test_the_limit_is_never_negative);
-    RUN_TEST(test_the_limit_that_the_planner_takes_is_not_in_whole_watts);
+    RUN_TEST(test_the_limits_that_the_planner_takes_are_not_in_whole_watts);
+    RUN_TEST(test_of_two_lines_the_lower_one_counts);
+    RUN_TEST(test_each_line_by_itself);
+    RUN_TEST(test_a_line_may_begin_above_what_connector_and_vehicle_allow);
     RUN_TEST(test_an_unknown_capacity_means_no_taper);
     RUN_TEST(test_useful_power_is_bounded_by_connector_taper_and_need);
     RUN_TEST(test_nothing_is_useful_for_an_inactive_demand);

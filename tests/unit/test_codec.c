@@ -27,6 +27,7 @@ enum {
     KIND_ev_param_b = TAPER_MESSAGE_EV_PARAM_B,
     KIND_ev_param_c = TAPER_MESSAGE_EV_PARAM_C,
     KIND_ev_param_d = TAPER_MESSAGE_EV_PARAM_D,
+    KIND_ev_param_e = TAPER_MESSAGE_EV_PARAM_E,
     KIND_evse_info = TAPER_MESSAGE_EVSE_INFO,
     KIND_plan = TAPER_MESSAGE_PLAN,
     KIND_outlook = TAPER_MESSAGE_OUTLOOK,

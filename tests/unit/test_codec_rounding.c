@@ -118,6 +118,14 @@ static void test_the_taper_is_rounded_down(void) {
     TEST_ASSERT_EQUAL_INT32(4400, over_the_wire(&message).as.ev_param_d.taper_W);
 }
 
+static void test_the_second_line_is_rounded_as_the_first(void) {
+    taper_message_t message = codec_bench_message_of(TAPER_MESSAGE_EV_PARAM_E);
+    message.as.ev_param_e = (taper_ev_param_e_t){.peak_W = 300001, .taper_W = 290009};
+    const taper_ev_param_e_t e = over_the_wire(&message).as.ev_param_e;
+    TEST_ASSERT_EQUAL_INT32(300010, e.peak_W);
+    TEST_ASSERT_EQUAL_INT32(290000, e.taper_W);
+}
+
 static void test_a_capacity_is_rounded_to_the_nearest_and_zero_is_unknown(void) {
     static const int32_t sent[] = {60049, 60050, 120, 1, 0, -5, 9000000};
     static const int32_t expected[] = {60000, 60100, 100, 100, TAPER_ABSENT, TAPER_ABSENT, 6553400};
@@ -179,6 +187,7 @@ int main(void) {
     RUN_TEST(test_a_reported_soc_is_the_nearest_half_percent);
     RUN_TEST(test_what_a_vehicle_wants_or_can_take_is_rounded_up);
     RUN_TEST(test_the_taper_is_rounded_down);
+    RUN_TEST(test_the_second_line_is_rounded_as_the_first);
     RUN_TEST(test_a_capacity_is_rounded_to_the_nearest_and_zero_is_unknown);
     RUN_TEST(test_iterations_are_rounded_up_to_what_fits);
     RUN_TEST(test_any_bytes_are_refused_or_stay_what_they_were_decoded_to);

@@ -99,6 +99,8 @@ static void test_one_that_is_larger_than_the_image_is_refused(void) {
     REFUSED(config.group_count = TAPER_MAX_GROUPS + 1);
     REFUSED(config.steps = 1);
     REFUSED(config.steps = TAPER_MAX_STEPS + 1);
+    REFUSED(config.planning.taper_lines = TAPER_MAX_TAPER_LINES + 1);
+    ACCEPTED(config.planning.taper_lines = TAPER_MAX_TAPER_LINES);
     ACCEPTED(config.steps = TAPER_MAX_STEPS);
     ACCEPTED(config.steps = 2);
 }

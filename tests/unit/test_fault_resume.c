@@ -17,7 +17,7 @@ static double draws_A; /* connector 1, whatever it is told, as long as nobody sa
 static bool is_of_a_vehicle(uint32_t function) {
     return function == TAPER_MESSAGE_EV_STATUS || function == TAPER_MESSAGE_EV_PARAM_A ||
            function == TAPER_MESSAGE_EV_PARAM_B || function == TAPER_MESSAGE_EV_PARAM_C ||
-           function == TAPER_MESSAGE_EV_PARAM_D;
+           function == TAPER_MESSAGE_EV_PARAM_D || function == TAPER_MESSAGE_EV_PARAM_E;
 }
 
 static void alter(taper_frame_t *frame) {

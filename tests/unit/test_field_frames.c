@@ -147,6 +147,38 @@ static void test_the_power_follows_the_taper(void) {
     TEST_ASSERT_DOUBLE_WITHIN(0.01, end_kwh - 20.0, field_evse(1)->energy_kwh);
 }
 
+static void test_a_second_line_is_told_where_there_is_one_and_obeyed(void) {
+    sim_field_options_t options = field_options();
+    options.time_scale = 60;
+    sim_session_t sessions[] = {field_vehicle(0.0), field_vehicle(0.0)};
+    sessions[0].second_max_kw = 38.5;
+    sessions[0].second_taper_kw = 37.0; /* 20 kW at 50 % */
+    field_start(&options, sessions, 2);
+    field_run_ms(1000);
+    field_forget();
+    field_run_ms(20000);
+    check_period(TAPER_MESSAGE_EV_PARAM_E, 1, 2000);
+    const taper_ev_param_e_t e = field_log(TAPER_MESSAGE_EV_PARAM_E, 1)->message.as.ev_param_e;
+    TEST_ASSERT_EQUAL_INT32(38500, e.peak_W);
+    TEST_ASSERT_EQUAL_INT32(37000, e.taper_W);
+    TEST_ASSERT_EQUAL_UINT8(field_log(TAPER_MESSAGE_EV_PARAM_A, 1)->message.as.ev_param_a.session, e.session);
+    TEST_ASSERT_EQUAL_UINT32(0, field_log(TAPER_MESSAGE_EV_PARAM_E, 2)->count);
+    field_charge(1, 1, 32000, 127000);
+    field_run_ms(40);
+    TEST_ASSERT_DOUBLE_WITHIN(0.05, 20.0, field_evse(1)->power_kw);
+}
+
+static void test_who_keeps_its_taper_back_keeps_both_lines(void) {
+    sim_field_options_t options = field_options();
+    options.tells_taper = false;
+    sim_session_t sessions[] = {field_vehicle(0.0)};
+    sessions[0].second_max_kw = 38.5;
+    field_start(&options, sessions, 1);
+    field_run_ms(5000);
+    TEST_ASSERT_EQUAL_UINT32(0, field_log(TAPER_MESSAGE_EV_PARAM_D, 1)->count);
+    TEST_ASSERT_EQUAL_UINT32(0, field_log(TAPER_MESSAGE_EV_PARAM_E, 1)->count);
+}
+
 static void test_the_clock_tells_the_time_of_the_world(void) {
     sim_field_options_t options = field_options();
     options.time_scale = 600;
@@ -245,6 +277,8 @@ int main(void) {
     RUN_TEST(test_energy_is_told_as_it_moves_but_not_too_often);
     RUN_TEST(test_a_full_vehicle_says_so_at_once);
     RUN_TEST(test_the_power_follows_the_taper);
+    RUN_TEST(test_a_second_line_is_told_where_there_is_one_and_obeyed);
+    RUN_TEST(test_who_keeps_its_taper_back_keeps_both_lines);
     RUN_TEST(test_the_clock_tells_the_time_of_the_world);
     RUN_TEST(test_a_change_of_the_limit_is_told_at_once);
     RUN_TEST(test_a_gateway_without_a_limit_is_alive_only);

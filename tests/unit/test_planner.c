@@ -411,7 +411,7 @@ static void compare_patterns(void) {
         copy.a_values = ours;
         taper_horizon_shape(&horizon, taper_stations[k]);
         for (uint8_t i = 0; i < taper_stations[k]->connector_count; i++) {
-            horizon.taper_keep[i] = (taper_real_t)0.97; /* the generator's example */
+            horizon.taper_keep[0][i] = (taper_real_t)0.97; /* the generator's example */
         }
         const bool fits = solver->a_count <= (OSQPInt)(sizeof ours / sizeof ours[0]) &&
                           taper_write_constraints(&copy, &horizon).count == solver->a_count;

@@ -5,14 +5,18 @@ energy charged since arrival at the end of the step [kWh]:
 
     maximise   sum of e(i,t)
     x(i,t) = x(i,t-1) + e(i,t),  x(i,-1) = 0,  x(i,t) <= request(i)
-    0 <= e(i,t) <= g(i,t) * hours * (max_kw(i) - taper_kw(i) * soc(i))   soc at the start of the step
+    0 <= e(i,t) <= g(i,l,t) * hours * (max_kw(i,l) - taper_kw(i,l) * soc(i))   soc at the start of the step, per line l
     sum over i of e(i,t) <= hours * mean limit in the step
     sum over i of per_kw(k,i) * e(i,t) <= hours * limit(k)               per row k of the feeder tree (feeders.py)
+
+A session has the lines that it tells; one with a curve has the edges of the curve's concave hull instead, which no
+vehicle that obeys the curve is above.
 
 With f the share of the step that the car is there, g is f when the power is held for the step (the paper's model,
 tick_s = step_s). A controller with a shorter tick lets the power fall with the SOC within the step; following the taper
 for n ticks gives what the recursion x <- x + hours_of_tick * (max_kw - taper_kw * soc) gives:
-g = f * (1 - (1-a)^n) / (n a), with a the relative drop per tick. A step that overlaps several limits only sees their
+g = f * (1 - (1-a)^n) / (n a), with a the relative drop per tick; a line that rises has a < 0. Each line alone is
+followed at best so, so with several of them it stays a bound. A step that overlaps several limits only sees their
 mean, and the number of connectors is not modelled; both can only raise the bound, so it stays a bound.
 """
 
@@ -63,9 +67,38 @@ def _cells(arrival_s: np.ndarray, departure_s: np.ndarray, step_s: float) -> _Ce
 def _taper_gain(present: np.ndarray, drop_per_tick: np.ndarray, ticks_per_step: float) -> np.ndarray:
     """g of the module's text: `present` reduced by how much the power falls within the step."""
     ticks = np.maximum(present * ticks_per_step, 1.0)
-    drop = np.where(drop_per_tick > 0, drop_per_tick, 1.0)
+    drop = np.where(drop_per_tick != 0, drop_per_tick, 1.0)
     reduced = (1 - (1 - drop) ** ticks) / (ticks * drop)
-    return present * np.where(drop_per_tick > 0, reduced, 1.0)
+    return present * np.where(drop_per_tick != 0, reduced, 1.0)
+
+
+@dataclass(frozen=True)
+class _LineRows:
+    """One entry per (cell, line of its session): e(cell) + slope * x(cell before) <= upper."""
+
+    cell: np.ndarray
+    slope: np.ndarray
+    upper: np.ndarray
+
+
+def _line_rows(cells: _Cells, sessions: list[Session], step_s: float, tick_s: float) -> _LineRows:
+    lines = [session.limit_lines for session in sessions]
+    count = np.array([len(own) for own in lines])
+    max_kw, taper_kw = np.array([line for own in lines for line in own]).T
+    owner = np.repeat(np.arange(count.size), count)
+    battery_kwh = np.array([session.battery_kwh for session in sessions])[owner]
+    soc_arrival = np.array([session.soc_arrival for session in sessions])[owner]
+    drop_per_tick = taper_kw / battery_kwh * tick_s / SECONDS_PER_HOUR
+    if np.any(drop_per_tick >= 1):
+        raise InputError(f"a step or tick of {tick_s:g} s is too long for the steepest taper")
+
+    count_of_cell = count[cells.session]
+    cell = np.repeat(np.arange(cells.session.size), count_of_cell)
+    place = np.arange(cell.size) - np.repeat(np.cumsum(count_of_cell) - count_of_cell, count_of_cell)
+    line = (np.cumsum(count) - count)[cells.session[cell]] + place
+    gain_h = _taper_gain(cells.present[cell], drop_per_tick[line], step_s / tick_s) * (step_s / SECONDS_PER_HOUR)
+    arrival_kw = max_kw - taper_kw * soc_arrival
+    return _LineRows(cell, gain_h * (taper_kw / battery_kwh)[line], gain_h * arrival_kw[line])
 
 
 @dataclass(frozen=True)
@@ -95,16 +128,18 @@ def _sums(cells: _Cells, limit: Limit, feeders: list[FeederRow], step_s: float) 
 
 
 def _matrix(
-    cells: _Cells, taper_per_kwh: np.ndarray, sums: _Sums
+    cells: _Cells, lines: _LineRows, sums: _Sums
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """CSC arrays (start, row, value). Columns: all e, then all x. Rows: balance, taper, sums."""
+    """CSC arrays (start, row, value). Columns: all e, then all x. Rows: balance, lines, sums."""
     count = cells.session.size
     cell = np.arange(count)
     followed = cell[:-1][~cells.is_first[1:]]
-    rows = [cell, count + cell, 2 * count + sums.row, cell, followed + 1, count + followed + 1]
-    columns = [cell, cell, sums.cell, count + cell, count + followed, count + followed]
-    values = [np.ones(count), np.ones(count), sums.value, -np.ones(count), np.ones(followed.size),
-              taper_per_kwh[followed + 1]]
+    line_row = count + np.arange(lines.cell.size)
+    later = ~cells.is_first[lines.cell]
+    rows = [cell, line_row, count + lines.cell.size + sums.row, cell, followed + 1, line_row[later]]
+    columns = [cell, lines.cell, sums.cell, count + cell, count + followed, count + lines.cell[later] - 1]
+    values = [np.ones(count), np.ones(lines.cell.size), sums.value, -np.ones(count), np.ones(followed.size),
+              lines.slope[later]]
     row, column, value = (np.concatenate(part) for part in (rows, columns, values))
     order = np.lexsort((row, column))
     start = np.searchsorted(column[order], np.arange(2 * count + 1))
@@ -118,30 +153,20 @@ def _linear_programme(
         return np.array([getattr(session, name) for session in sessions], dtype=float)
 
     cells = _cells(column("arrival_s"), column("departure_s"), step_s)
-    hours = step_s / SECONDS_PER_HOUR
-    max_kw, taper_kw = column("max_kw"), column("taper_kw")
-    taper_kw_per_kwh = taper_kw / column("battery_kwh")
-    drop_per_tick = taper_kw_per_kwh * tick_s / SECONDS_PER_HOUR
-    if np.any(drop_per_tick >= 1):
-        raise InputError(f"a step or tick of {tick_s:g} s is too long for the steepest taper")
-    gain = _taper_gain(cells.present, drop_per_tick[cells.session], step_s / tick_s)
-    arrival_kw = max_kw - taper_kw * column("soc_arrival")
-
+    lines = _line_rows(cells, sessions, step_s, tick_s)
     sums = _sums(cells, limit, feeders, step_s)
     count = cells.session.size
     lp = highspy.HighsLp()
     lp.num_col_ = 2 * count
-    lp.num_row_ = 2 * count + sums.upper.size
+    lp.num_row_ = count + lines.upper.size + sums.upper.size
     lp.sense_ = highspy.ObjSense.kMaximize
     lp.col_cost_ = np.concatenate([np.ones(count), np.zeros(count)])
     lp.col_lower_ = np.zeros(2 * count)
     lp.col_upper_ = np.concatenate([np.full(count, highspy.kHighsInf), column("requested_kwh")[cells.session]])
-    no_bound = np.full(count + sums.upper.size, -highspy.kHighsInf)
+    no_bound = np.full(lines.upper.size + sums.upper.size, -highspy.kHighsInf)
     lp.row_lower_ = np.concatenate([np.zeros(count), no_bound])
-    lp.row_upper_ = np.concatenate([
-        np.zeros(count), gain * hours * arrival_kw[cells.session], sums.upper,
-    ])
-    start, row, value = _matrix(cells, gain * hours * taper_kw_per_kwh[cells.session], sums)
+    lp.row_upper_ = np.concatenate([np.zeros(count), lines.upper, sums.upper])
+    start, row, value = _matrix(cells, lines, sums)
     lp.a_matrix_.format_ = highspy.MatrixFormat.kColwise
     lp.a_matrix_.start_, lp.a_matrix_.index_, lp.a_matrix_.value_ = start, row, value
     return lp

@@ -38,6 +38,7 @@ def demand_line(station: Station, i: int, d: Demand) -> str:
     return (
         f"demand {i} 1 {d.stored_Wh} {d.capacity_Wh} {d.need_Wh} {d.peak_W} {d.taper_W} "
         f"{max_mA} {W_per_A:g} {d.departs_in_s} {phases}"
+        + (f"\nsecond {i} {d.second_peak_W} {d.second_taper_W}" if d.second_peak_W else "")
     )
 
 

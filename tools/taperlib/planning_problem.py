@@ -35,6 +35,15 @@ class Demand:
     departs_in_s: int
     conductors: int | None = None  # in use, of a socket that has more
     max_mA: int | None = None  # what vehicle and connector allow; None: the connector's
+    second_peak_W: int = 0  # of another line of the taper; 0: none
+    second_taper_W: int = 0
+
+    @property
+    def lines(self) -> list[tuple[float, float]]:
+        """Of the taper: power at the present charge [W], and its fall per Wh."""
+        told = [(self.peak_W, self.taper_W), (self.second_peak_W, self.second_taper_W)]
+        falls = [(peak_W, taper_W / self.capacity_Wh if self.capacity_Wh else 0.0) for peak_W, taper_W in told if peak_W]
+        return [(max(peak_W - fall * self.stored_Wh, 0.0), fall) for peak_W, fall in falls] or [(0.0, 0.0)]
 
 
 @dataclass(frozen=True)
@@ -199,8 +208,7 @@ class Problem:
 
     def _add_vehicle(self, chain: int, demand: Demand, connector_W: float) -> None:
         base_W, step_s = self.station.base_W, self.station.step_s
-        fall_per_Wh = demand.taper_W / demand.capacity_Wh if demand.capacity_Wh else 0.0
-        now_W = max(demand.peak_W - fall_per_Wh * demand.stored_Wh, 0.0)
+        now_W = min(line_W for line_W, _ in demand.lines)
         charging = demand.need_Wh * 3600 / min(now_W, connector_W) / step_s if now_W > 0 else 0.0
         weight = self._weight(demand.departs_in_s / step_s, charging)
         for t in range(self.station.steps):
@@ -211,8 +219,9 @@ class Problem:
             self._dynamics.append({x: 1.0, u: -1.0} | ({before: -1.0} if t else {}))
             self._at_most({u: -1.0}, 0.0)
             self._at_most({u: 1.0}, connector_W / base_W * there)
-            slope = fall_per_Wh * step_s / 3600
-            self._at_most({u: 1.0} | ({before: slope} if t else {}), now_W / base_W)
+            for line_W, fall_per_Wh in demand.lines:
+                slope = fall_per_Wh * step_s / 3600
+                self._at_most({u: 1.0} | ({before: slope} if t else {}), line_W / base_W)
         self._at_most({self._x(chain, self.station.steps - 1): 1.0}, demand.need_Wh * 3600 / step_s / base_W)
 
     def _inside(self, group: Group) -> list[int]:

@@ -1,9 +1,11 @@
 """Charging sessions: the CSV that the simulator replays, read, checked and written.
 
 Columns, in any order: session_id, connector, arrival_s, departure_s, battery_kwh, soc_arrival, soc_target, max_kw,
-taper_kw, and optionally expected_departure_s and phases. Times are seconds from the start of the simulation; SOC is 0 to
-1. The most that a vehicle takes is max_kw - taper_kw * soc, never below 0. An empty connector means the first free one,
-empty phases all that the connector has.
+taper_kw, and optionally expected_departure_s, phases, second_max_kw, second_taper_kw and curve. Times are seconds from
+the start of the simulation; SOC is 0 to 1. A vehicle tells that it takes at most max_kw - taper_kw * soc, and at most
+second_max_kw - second_taper_kw * soc if that is given, never below 0. It takes this, unless it has a curve, which it then
+obeys instead: points "soc:kw soc:kw ...", linear in between. An empty connector means the first free one, empty phases
+all that the connector has.
 """
 
 import csv
@@ -11,6 +13,7 @@ import io
 from dataclasses import dataclass
 from pathlib import Path
 
+from .charge_curve import Curve, Line, curve_text, hull_lines, parse_curve
 from .files import InputError, number_at, read_text, write_atomically
 
 TEXT_COLUMNS = ("session_id", "connector")
@@ -18,6 +21,8 @@ NUMBER_COLUMNS = ("arrival_s", "departure_s", "battery_kwh", "soc_arrival", "soc
 COLUMNS = TEXT_COLUMNS + NUMBER_COLUMNS
 EXPECTED_COLUMN = "expected_departure_s"
 PHASES_COLUMN = "phases"
+SECOND_COLUMNS = ("second_max_kw", "second_taper_kw")
+CURVE_COLUMN = "curve"
 
 
 @dataclass(frozen=True)
@@ -33,6 +38,22 @@ class Session:
     connector: str = ""
     expected_departure_s: float | None = None
     phases: int | None = None
+    second_max_kw: float | None = None
+    second_taper_kw: float | None = None
+    curve: Curve | None = None
+
+    @property
+    def told_lines(self) -> list[Line]:
+        """What the vehicle tells: the least of these lines, and of the flat limit that the curve's maximum is."""
+        lines = [(self.max_kw, self.taper_kw)]
+        if self.second_max_kw is not None and self.second_taper_kw is not None:
+            lines.append((self.second_max_kw, self.second_taper_kw))
+        return lines
+
+    @property
+    def limit_lines(self) -> list[Line]:
+        """Lines (kW at SOC 0, fall until SOC 1) that its power is never above: of the curve, its concave hull."""
+        return self.told_lines if self.curve is None else hull_lines(self.curve)
 
     @property
     def requested_kwh(self) -> float:
@@ -55,15 +76,38 @@ def _problem_in(session: Session) -> tuple[str, str] | None:
         return "max_kw", "is not greater than 0"
     if not 0 <= session.taper_kw <= session.max_kw:
         return "taper_kw", "is not between 0 and max_kw"
+    return _problem_in_second_line(session)
+
+
+def _problem_in_second_line(session: Session) -> tuple[str, str] | None:
+    max_kw, taper_kw = session.second_max_kw, session.second_taper_kw
+    if max_kw is None and taper_kw is None:
+        return None
+    if taper_kw is None:
+        return "second_max_kw", "is given without second_taper_kw"
+    if max_kw is None:
+        return "second_taper_kw", "is given without second_max_kw"
+    if max_kw <= 0:
+        return "second_max_kw", "is not greater than 0"
+    if not 0 <= taper_kw <= max_kw:
+        return "second_taper_kw", "is not between 0 and second_max_kw"
     return None
+
+
+def _optional_number(row: dict[str, str | None], name: str, where: str) -> float | None:
+    text = (row.get(name) or "").strip()
+    return number_at(text, f"{where}, column {name}") if text else None
+
+
+def _curve_of_row(row: dict[str, str | None], where: str) -> Curve | None:
+    text = (row.get(CURVE_COLUMN) or "").strip()
+    return parse_curve(text, f"{where}, column {CURVE_COLUMN}") if text else None
 
 
 def _session_of_row(row: dict[str, str | None], where: str) -> Session:
     numbers = {name: number_at(row[name], f"{where}, column {name}") for name in NUMBER_COLUMNS}
-    expected_text = (row.get(EXPECTED_COLUMN) or "").strip()
-    expected_s = number_at(expected_text, f"{where}, column {EXPECTED_COLUMN}") if expected_text else None
-    phases_text = (row.get(PHASES_COLUMN) or "").strip()
-    phases = number_at(phases_text, f"{where}, column {PHASES_COLUMN}") if phases_text else None
+    expected_s, phases, *second = (_optional_number(row, name, where)
+                                   for name in (EXPECTED_COLUMN, PHASES_COLUMN, *SECOND_COLUMNS))
     if phases not in (None, 1, 3):
         raise InputError(f"{where}, column {PHASES_COLUMN}: {phases:g} is neither 1 nor 3")
     session = Session(
@@ -71,6 +115,8 @@ def _session_of_row(row: dict[str, str | None], where: str) -> Session:
         connector=(row["connector"] or "").strip(),
         expected_departure_s=expected_s,
         phases=None if phases is None else int(phases),
+        curve=_curve_of_row(row, where),
+        **dict(zip(SECOND_COLUMNS, second, strict=True)),
         **numbers,
     )
     if not session.session_id:
@@ -78,7 +124,7 @@ def _session_of_row(row: dict[str, str | None], where: str) -> Session:
     problem = _problem_in(session)
     if problem:
         column, reason = problem
-        raise InputError(f"{where}, column {column}: {numbers[column]:g} {reason}")
+        raise InputError(f"{where}, column {column}: {getattr(session, column):g} {reason}")
     return session
 
 
@@ -108,7 +154,17 @@ def _number_text(value: float, decimals: int) -> str:
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
-def _row_of_session(session: Session, with_expected: bool, with_phases: bool) -> list[str]:
+# Of the optional columns: the text of a session's value.
+_OPTIONAL = {
+    EXPECTED_COLUMN: lambda value: _number_text(value, 3),
+    PHASES_COLUMN: str,
+    SECOND_COLUMNS[0]: lambda value: _number_text(value, 6),
+    SECOND_COLUMNS[1]: lambda value: _number_text(value, 6),
+    CURVE_COLUMN: curve_text,
+}
+
+
+def _row_of_session(session: Session, optional: list[str]) -> list[str]:
     row = [
         session.session_id,
         session.connector,
@@ -120,21 +176,17 @@ def _row_of_session(session: Session, with_expected: bool, with_phases: bool) ->
         _number_text(session.max_kw, 6),
         _number_text(session.taper_kw, 6),
     ]
-    if with_expected:
-        expected_s = session.expected_departure_s
-        row.append("" if expected_s is None else _number_text(expected_s, 3))
-    if with_phases:
-        row.append("" if session.phases is None else str(session.phases))
-    return row
+    values = ((name, getattr(session, name)) for name in optional)
+    return row + ["" if value is None else _OPTIONAL[name](value) for name, value in values]
 
 
 def write_sessions_csv(path: Path, sessions: list[Session]) -> None:
-    with_expected = any(session.expected_departure_s is not None for session in sessions)
+    """Optional columns only where some session has a value."""
+    optional = [name for name in _OPTIONAL if any(getattr(session, name) is not None for session in sessions)]
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
-    with_phases = any(session.phases is not None for session in sessions)
-    writer.writerow(COLUMNS + ((EXPECTED_COLUMN,) if with_expected else ()) + ((PHASES_COLUMN,) if with_phases else ()))
-    writer.writerows(_row_of_session(session, with_expected, with_phases) for session in sessions)
+    writer.writerow((*COLUMNS, *optional))
+    writer.writerows(_row_of_session(session, optional) for session in sessions)
     write_atomically(path, buffer.getvalue())
 
 

@@ -17,18 +17,9 @@ static int64_t at_most(int64_t value, int64_t most) {
     return value < most ? value : most;
 }
 
-/** What the battery takes at its present charge [W]; the model of taper/battery.h. */
-static int32_t battery_takes_W(const taper_demand_t *demand) {
-    if (demand->capacity_Wh <= 0) {
-        return demand->peak_W;
-    }
-    const int64_t fall_W = taper_quotient((int64_t)demand->taper_W * demand->stored_Wh, demand->capacity_Wh);
-    return demand->peak_W - (int32_t)at_most(fall_W, demand->peak_W);
-}
-
 /** What the vehicle draws at most until the next tick, whatever it is offered [mW]. */
 static int64_t draws_mW(const taper_station_config_t *config, const taper_demand_t *demand) {
-    const int64_t takes_W = battery_takes_W(demand);
+    const int64_t takes_W = taper_demand_battery_W(demand);
     const int64_t need_mWs = (int64_t)demand->need_Wh * 3600 * 1000;
     if (takes_W * config->tick_ms <= need_mWs) {
         return takes_W * 1000; /* it is not complete by then */
@@ -38,7 +29,7 @@ static int64_t draws_mW(const taper_station_config_t *config, const taper_demand
 
 /** Time to departure less the time to charge; who cannot charge is helped least by a place [s]. */
 static int32_t laxity_s(const taper_demand_t *demand) {
-    const int32_t power_W = taper_min_i32(taper_demand_allowed_W(demand), battery_takes_W(demand));
+    const int32_t power_W = taper_min_i32(taper_demand_allowed_W(demand), taper_demand_battery_W(demand));
     if (power_W <= 0) {
         return INT32_MAX;
     }

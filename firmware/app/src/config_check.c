@@ -43,6 +43,7 @@ static bool planning_is_sound(const taper_station_config_t *config) {
     return planning->objective <= TAPER_OBJECTIVE_LOG_UTILITY && planning->horizon_steps != 1 &&
            planning->horizon_steps <= config->steps &&
            planning->outer_iterations <= TAPER_MAX_OUTER_ITERATIONS &&
+           planning->taper_lines <= TAPER_MAX_TAPER_LINES &&
            within(planning->lambda_milli_per_kWh2, 0, MOST_LAMBDA_milli_per_kWh2);
 }
 

@@ -6,11 +6,11 @@
 #define MAX_FRAMES (TAPER_MAX_CONNECTORS * 32u + 64u)
 
 /** Nominal frames a second, rounded up. What is also sent on change counts twice: a connector's EVSE_STATUS and
-    EV_PARAM_A..D, beside its EV_STATUS, EVSE_ELEC and EVSE_INFO; the gateway's SITE_LIMIT, beside SITE_METER and TIME_SYNC.
+    EV_PARAM_A..E, beside its EV_STATUS, EVSE_ELEC and EVSE_INFO; the gateway's SITE_LIMIT, beside SITE_METER and TIME_SYNC.
     Three times that is too much. */
 #define CONNECTOR_NOMINAL                                                         \
     (2u * 1000u / TAPER_EVSE_STATUS_CYCLE_ms + 1000u / TAPER_EV_STATUS_CYCLE_ms + \
-     1000u / TAPER_EVSE_ELEC_CYCLE_ms + 2u * 4000u / TAPER_EV_PARAM_A_CYCLE_ms + 1u)
+     1000u / TAPER_EVSE_ELEC_CYCLE_ms + 2u * 5000u / TAPER_EV_PARAM_A_CYCLE_ms + 1u)
 #define GATEWAY_NOMINAL 4u
 #define TOO_MUCH        3u
 
@@ -31,8 +31,9 @@ static int connector_place(unsigned function) {
     case TAPER_MESSAGE_EV_PARAM_B: return 4;
     case TAPER_MESSAGE_EV_PARAM_C: return 5;
     case TAPER_MESSAGE_EV_PARAM_D: return 6;
-    case TAPER_MESSAGE_EVSE_INFO: return 7;
-    case TAPER_MESSAGE_EMCY: return 8;
+    case TAPER_MESSAGE_EV_PARAM_E: return 7;
+    case TAPER_MESSAGE_EVSE_INFO: return 8;
+    case TAPER_MESSAGE_EMCY: return 9;
     default: return -1;
     }
 }

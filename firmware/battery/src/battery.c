@@ -8,11 +8,7 @@ static int64_t divide_up(int64_t numerator, int64_t denominator) {
 }
 
 int32_t taper_battery_limit_W(const taper_demand_t *demand) {
-    if (demand->capacity_Wh <= 0) {
-        return demand->peak_W;
-    }
-    const int64_t fall_W = taper_quotient((int64_t)demand->taper_W * demand->stored_Wh, demand->capacity_Wh);
-    return taper_saturate_i32(fall_W >= demand->peak_W ? 0 : demand->peak_W - fall_W);
+    return taper_demand_battery_W(demand);
 }
 
 int32_t taper_battery_useful_W(const taper_demand_t *demand, uint32_t tick_ms) {
@@ -27,14 +23,19 @@ int32_t taper_battery_useful_W(const taper_demand_t *demand, uint32_t tick_ms) {
     return taper_saturate_i32(divide_up(need_mWs, tick_ms));
 }
 
-taper_real_t taper_battery_slope_per_h(const taper_demand_t *demand) {
+taper_real_t taper_battery_slope_per_h(const taper_demand_t *demand, uint8_t line) {
     if (demand->capacity_Wh <= 0) {
         return 0;
     }
-    return (taper_real_t)demand->taper_W / (taper_real_t)demand->capacity_Wh;
+    const int32_t taper_W = line == 0 ? demand->taper_W : demand->second_taper_W;
+    return (taper_real_t)taper_W / (taper_real_t)demand->capacity_Wh;
 }
 
-taper_real_t taper_battery_limit_now_W(const taper_demand_t *demand) {
-    const taper_real_t fall_W = taper_battery_slope_per_h(demand) * (taper_real_t)demand->stored_Wh;
-    return taper_real_max((taper_real_t)demand->peak_W - fall_W, 0);
+taper_real_t taper_battery_line_now_W(const taper_demand_t *demand, uint8_t line) {
+    const int32_t peak_W = line == 0 ? demand->peak_W : demand->second_peak_W;
+    if (line > 0 && peak_W <= 0) {
+        return TAPER_REAL_UNBOUNDED;
+    }
+    const taper_real_t fall_W = taper_battery_slope_per_h(demand, line) * (taper_real_t)demand->stored_Wh;
+    return taper_real_max((taper_real_t)peak_W - fall_W, 0);
 }

@@ -38,6 +38,7 @@ static const route_t routes[KINDS] = {
     [TAPER_MESSAGE_OUTLOOK] = {NODE_CONNECTOR, taper_decode_outlook, taper_encode_outlook},
     [TAPER_MESSAGE_CTRL_DIAG] = {NODE_CONTROLLER, taper_decode_ctrl_diag, taper_encode_ctrl_diag},
     [TAPER_MESSAGE_EV_PARAM_D] = {NODE_CONNECTOR, taper_decode_ev_param_d, taper_encode_ev_param_d},
+    [TAPER_MESSAGE_EV_PARAM_E] = {NODE_CONNECTOR, taper_decode_ev_param_e, taper_encode_ev_param_e},
 };
 
 /* The bit of a node, 0 for one that nobody has. */

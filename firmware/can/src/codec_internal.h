@@ -73,6 +73,7 @@ void taper_decode_ev_param_a(const uint8_t *data, taper_message_t *message, tape
 void taper_decode_ev_param_b(const uint8_t *data, taper_message_t *message, taper_decoding_t *decoding);
 void taper_decode_ev_param_c(const uint8_t *data, taper_message_t *message, taper_decoding_t *decoding);
 void taper_decode_ev_param_d(const uint8_t *data, taper_message_t *message, taper_decoding_t *decoding);
+void taper_decode_ev_param_e(const uint8_t *data, taper_message_t *message, taper_decoding_t *decoding);
 void taper_decode_emcy(const uint8_t *data, taper_message_t *message, taper_decoding_t *decoding);
 void taper_decode_evse_info(const uint8_t *data, taper_message_t *message, taper_decoding_t *decoding);
 void taper_decode_plan(const uint8_t *data, taper_message_t *message, taper_decoding_t *decoding);
@@ -92,6 +93,7 @@ bool taper_encode_ev_param_a(const taper_message_t *message, uint8_t *data);
 bool taper_encode_ev_param_b(const taper_message_t *message, uint8_t *data);
 bool taper_encode_ev_param_c(const taper_message_t *message, uint8_t *data);
 bool taper_encode_ev_param_d(const taper_message_t *message, uint8_t *data);
+bool taper_encode_ev_param_e(const taper_message_t *message, uint8_t *data);
 bool taper_encode_emcy(const taper_message_t *message, uint8_t *data);
 bool taper_encode_evse_info(const taper_message_t *message, uint8_t *data);
 bool taper_encode_plan(const taper_message_t *message, uint8_t *data);

@@ -1,4 +1,4 @@
-/* What the vehicle says, passed on by its connector: EV_STATUS and EV_PARAM_A..D. */
+/* What the vehicle says, passed on by its connector: EV_STATUS and EV_PARAM_A..E. */
 #include "codec_internal.h"
 #include "taper/types.h"
 #include "taper_dbc.h"
@@ -134,4 +134,25 @@ bool taper_encode_ev_param_d(const taper_message_t *message, uint8_t *data) {
         .taper_power = (uint16_t)taper_field_encode(&taper_field_ev_param_d_taper_power, param->taper_W),
     };
     return taper_dbc_ev_param_d_pack(data, &raw, TAPER_FRAME_LENGTH) == TAPER_FRAME_LENGTH;
+}
+
+void taper_decode_ev_param_e(const uint8_t *data, taper_message_t *message, taper_decoding_t *decoding) {
+    struct taper_dbc_ev_param_e_t raw;
+    taper_ev_param_e_t *param = &message->as.ev_param_e;
+    (void)taper_dbc_ev_param_e_unpack(&raw, data, TAPER_FRAME_LENGTH);
+    param->revision = raw.revision;
+    param->session = raw.session;
+    param->peak_W = taper_field_decode(&taper_field_ev_param_e_peak_power, raw.peak_power, decoding);
+    param->taper_W = taper_field_decode(&taper_field_ev_param_e_taper_power, raw.taper_power, decoding);
+}
+
+bool taper_encode_ev_param_e(const taper_message_t *message, uint8_t *data) {
+    const taper_ev_param_e_t *param = &message->as.ev_param_e;
+    const struct taper_dbc_ev_param_e_t raw = {
+        .revision = (uint8_t)(param->revision & 0x0Fu),
+        .session = param->session,
+        .peak_power = (uint16_t)taper_field_encode(&taper_field_ev_param_e_peak_power, param->peak_W),
+        .taper_power = (uint16_t)taper_field_encode(&taper_field_ev_param_e_taper_power, param->taper_W),
+    };
+    return taper_dbc_ev_param_e_pack(data, &raw, TAPER_FRAME_LENGTH) == TAPER_FRAME_LENGTH;
 }

@@ -7,12 +7,18 @@
 #include "taper/real_math.h"
 #include "worth.h"
 
+/** A line of the taper, per unit. */
+typedef struct {
+    taper_real_t limit; /* at the present SOC */
+    taper_real_t slope; /* a_i per step */
+} line_t;
+
 /** What one connector brings into the problem, per unit. */
 typedef struct {
     taper_real_t rate;  /* limit of connector and vehicle */
-    taper_real_t taper; /* limit at the present SOC */
-    taper_real_t slope; /* a_i per step */
-    taper_real_t need;  /* energy */
+    taper_real_t taper; /* least of all lines at the present SOC */
+    line_t line[TAPER_MAX_TAPER_LINES];
+    taper_real_t need; /* energy */
     int32_t departs_in_s;
 } chain_t;
 
@@ -45,34 +51,59 @@ static taper_real_t strongest_connector_W(const taper_station_config_t *config) 
     return (taper_real_t)strongest_mW / 1000;
 }
 
-static chain_t chain_of(const taper_horizon_t *horizon, const taper_demand_t *demand) {
-    const uint16_t step_s = horizon->config->step_s;
-    const taper_real_t step_h = (taper_real_t)step_s / 3600;
-    const taper_real_t slope = taper_battery_slope_per_h(demand) * step_h;
-    return (chain_t){
-        .rate = (taper_real_t)taper_demand_allowed_W(demand) / horizon->base_W,
-        .taper = taper_battery_limit_now_W(demand) / horizon->base_W,
+static taper_real_t step_h(const taper_horizon_t *horizon) {
+    return (taper_real_t)horizon->config->step_s / 3600;
+}
+
+/** Without such a line: one that limits nothing. */
+static line_t line_of(const taper_horizon_t *horizon, const taper_demand_t *demand, uint8_t line) {
+    const taper_real_t limit_W = taper_battery_line_now_W(demand, line);
+    if (limit_W >= TAPER_REAL_UNBOUNDED) {
+        return (line_t){.limit = TAPER_REAL_UNBOUNDED};
+    }
+    const taper_real_t slope = taper_battery_slope_per_h(demand, line) * step_h(horizon);
+    return (line_t){
+        .limit = limit_W / horizon->base_W,
         .slope = slope < 1 ? slope
                            : 1, /* a battery that fills within one step: the taper row then bounds v(i,t) */
-        .need = (taper_real_t)demand->need_Wh / (horizon->base_W * step_h),
+    };
+}
+
+static chain_t chain_of(const taper_horizon_t *horizon, const taper_demand_t *demand) {
+    chain_t chain = {
+        .rate = (taper_real_t)taper_demand_allowed_W(demand) / horizon->base_W,
+        .taper = taper_real_min(taper_battery_line_now_W(demand, 0), taper_battery_line_now_W(demand, 1)) /
+                 horizon->base_W,
+        .need = (taper_real_t)demand->need_Wh / (horizon->base_W * step_h(horizon)),
         .departs_in_s = demand->departs_in_s,
     };
+    for (uint8_t line = 0; line < taper_lines_planned(horizon->config); line++) {
+        chain.line[line] = line_of(horizon, demand, line);
+    }
+    return chain;
+}
+
+/** A connector whose taper says nothing. */
+static void free_taper(taper_horizon_t *horizon, uint8_t i) {
+    for (uint8_t line = 0; line < taper_lines_planned(horizon->config); line++) {
+        const size_t row = taper_first_taper_row(horizon->config, line, i);
+        for (uint8_t t = 1; t < horizon->config->steps; t++) {
+            horizon->lower[row + t - 1] = -TAPER_REAL_UNBOUNDED;
+            horizon->upper[row + t - 1] = TAPER_REAL_UNBOUNDED;
+        }
+        horizon->taper_keep[line][i] = 1;
+    }
 }
 
 static void write_idle(taper_horizon_t *horizon, uint8_t i) {
     const uint8_t steps = horizon->config->steps;
-    const size_t taper_row = taper_first_taper_row(horizon->config) + (size_t)i * (steps - 1U);
     for (uint8_t t = 0; t < steps; t++) {
         const size_t v = (size_t)i * steps + t;
         horizon->linear[v] = 0;
         horizon->lower[v] = 0;
         horizon->upper[v] = 0;
-        if (t > 0) {
-            horizon->lower[taper_row + t - 1] = -TAPER_REAL_UNBOUNDED;
-            horizon->upper[taper_row + t - 1] = TAPER_REAL_UNBOUNDED;
-        }
     }
-    horizon->taper_keep[i] = 1;
+    free_taper(horizon, i);
 }
 
 static uint8_t planned_steps(const taper_station_config_t *config) {
@@ -90,10 +121,37 @@ static taper_real_t worth_planning(const chain_t *chain, taper_real_t rate) {
     return most > TAPER_LEAST_POWER ? most : 0;
 }
 
+/** Whether another line is below this one from the present charge to the target: its rows alone converge sooner. */
+static bool is_above_another(const taper_horizon_t *horizon, const chain_t *chain, uint8_t line) {
+    const line_t *own = &chain->line[line];
+    for (uint8_t k = 0; k < taper_lines_planned(horizon->config); k++) {
+        const line_t *other = &chain->line[k];
+        const bool is_lower_at_target =
+            other->limit - other->slope * chain->need < own->limit - own->slope * chain->need;
+        if (k != line && other->limit < own->limit && is_lower_at_target) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/** Taper rows by one line. */
+static void write_line(taper_horizon_t *horizon, uint8_t i, const chain_t *chain, uint8_t line) {
+    const line_t *own = &chain->line[line];
+    const bool tapers =
+        (own->slope > 0 || own->limit < chain->rate) && !is_above_another(horizon, chain, line);
+    taper_real_t *upper = horizon->upper + taper_first_taper_row(horizon->config, line, i);
+    for (uint8_t t = 1; t < horizon->config->steps; t++) {
+        if (tapers && planned_presence(horizon->config, chain, t) > 0) {
+            upper[t - 1] = own->limit * horizon->taper_scale;
+        }
+    }
+    horizon->taper_keep[line][i] = 1 - own->slope;
+}
+
 static void write_chain(taper_horizon_t *horizon, uint8_t i, const chain_t *chain,
                         const int32_t *site_limit_W) {
     const uint8_t steps = horizon->config->steps;
-    const size_t taper_row = taper_first_taper_row(horizon->config) + (size_t)i * (steps - 1U);
     for (uint8_t t = 0; t < steps; t++) {
         const size_t v = (size_t)i * steps + t;
         const taper_real_t there = planned_presence(horizon->config, chain, t);
@@ -105,14 +163,12 @@ static void write_chain(taper_horizon_t *horizon, uint8_t i, const chain_t *chai
         }
         if (t == 0) {
             horizon->upper[v] = taper_real_min(horizon->upper[v], chain->taper);
-            continue;
         }
-        const bool tapers = chain->slope > 0 || chain->taper < chain->rate;
-        horizon->lower[taper_row + t - 1] = -TAPER_REAL_UNBOUNDED;
-        horizon->upper[taper_row + t - 1] =
-            tapers && there > 0 ? chain->taper * horizon->taper_scale : TAPER_REAL_UNBOUNDED;
     }
-    horizon->taper_keep[i] = 1 - chain->slope;
+    free_taper(horizon, i);
+    for (uint8_t line = 0; line < taper_lines_planned(horizon->config); line++) {
+        write_line(horizon, i, chain, line);
+    }
 }
 
 static void write_connector(taper_horizon_t *horizon, uint8_t i, const taper_demand_t *demand,
@@ -146,7 +202,9 @@ void taper_horizon_shape(taper_horizon_t *horizon, const taper_station_config_t 
     taper_sums_list(horizon);
     for (uint8_t i = 0; i < config->connector_count; i++) {
         taper_sums_weigh(horizon, i, NULL);
-        horizon->taper_keep[i] = 1;
+        for (uint8_t line = 0; line < TAPER_MAX_TAPER_LINES; line++) {
+            horizon->taper_keep[line][i] = 1;
+        }
         horizon->unit[i] = 1;
     }
 }

@@ -35,18 +35,24 @@ static uint16_t weights_of(taper_real_t *weights, const taper_horizon_t *horizon
     return count;
 }
 
-/** Column v(i,t) up to its sums. Its rows, ascending: rate t, rate t+1, taper t, taper t+1, target. */
+/** Column v(i,t) up to its sums. Its rows, ascending: rate t, rate t+1; taper t, taper t+1 of each line; target. */
 static void put_chain(taper_writer_t *writer, const taper_horizon_t *horizon, uint8_t i, uint8_t t,
                       bool last_step) {
     taper_writer_put(writer, 1);
     if (!last_step) {
         taper_writer_put(writer, -1);
     }
-    if (t > 0) {
-        taper_writer_put(writer, horizon->taper_scale);
+    for (uint8_t line = 0; line < taper_lines_planned(horizon->config); line++) {
+        if (t > 0) {
+            taper_writer_put(writer, horizon->taper_scale);
+        }
+        if (!last_step) {
+            taper_writer_put(writer, -horizon->taper_keep[line][i] * horizon->taper_scale);
+        }
     }
-    taper_writer_put(writer,
-                     last_step ? horizon->target_scale : -horizon->taper_keep[i] * horizon->taper_scale);
+    if (last_step) {
+        taper_writer_put(writer, horizon->target_scale);
+    }
 }
 
 /** Sum rows of one column: the weight in step t, minus it in step t+1. */

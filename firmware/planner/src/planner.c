@@ -60,7 +60,7 @@ static bool solver_fits(const taper_solver_t *solver, const taper_horizon_t *hor
     const OSQPInt variables = (OSQPInt)config->connector_count * config->steps;
     return solver->connectors == config->connector_count && solver->steps == config->steps &&
            solver->sums == horizon->sum_count && solver->variables == variables &&
-           solver->rows == 2 * variables + (OSQPInt)horizon->sum_count * config->steps;
+           solver->rows == (OSQPInt)taper_first_sum_row(config) + (OSQPInt)horizon->sum_count * config->steps;
 }
 
 /** Write the matrices' values, and note whether they changed, by tapers or by what connectors count. @return they fit. */

@@ -8,14 +8,13 @@
 /** Where the row blocks of one problem begin. */
 typedef struct {
     const taper_horizon_t *horizon;
-    const taper_real_t *taper_upper, *target_upper, *sum_upper;
+    const taper_real_t *target_upper, *sum_upper;
     taper_real_t power[TAPER_MAX_CONNECTORS]; /* u(i,t) of the step in work */
 } projection_t;
 
 static projection_t projection_of(const taper_horizon_t *horizon) {
     return (projection_t){
         .horizon = horizon,
-        .taper_upper = horizon->upper + taper_first_taper_row(horizon->config),
         .target_upper = horizon->upper + taper_first_target_row(horizon->config),
         .sum_upper = horizon->upper + taper_first_sum_row(horizon->config),
     };
@@ -27,9 +26,9 @@ static taper_real_t allowed_power(const projection_t *projection, uint8_t i, uin
     const taper_horizon_t *horizon = projection->horizon;
     const uint8_t steps = horizon->config->steps;
     taper_real_t allowed = horizon->upper[(size_t)i * steps + t];
-    if (t > 0) {
-        const taper_real_t slope = 1 - horizon->taper_keep[i];
-        const taper_real_t now = projection->taper_upper[(size_t)i * (steps - 1U) + t - 1];
+    for (uint8_t line = 0; t > 0 && line < taper_lines_planned(horizon->config); line++) {
+        const taper_real_t slope = 1 - horizon->taper_keep[line][i];
+        const taper_real_t now = horizon->upper[taper_first_taper_row(horizon->config, line, i) + t - 1];
         allowed = taper_real_min(allowed, now / horizon->taper_scale - slope * charged);
     }
     allowed = taper_real_min(allowed, projection->target_upper[i] / horizon->target_scale - charged);

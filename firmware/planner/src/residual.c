@@ -26,12 +26,11 @@ static void count_chain(taper_residual_t *residual, const taper_horizon_t *horiz
                         uint8_t i) {
     const uint8_t steps = horizon->config->steps;
     const OSQPFloat *chain = x + (size_t)i * steps;
-    const size_t taper_row = taper_first_taper_row(horizon->config) + (size_t)i * (steps - 1U);
     for (uint8_t t = 0; t < steps; t++) {
         count_row(residual, horizon, (size_t)i * steps + t, power_of(x, steps, i, t));
-        if (t > 0) {
-            count_row(residual, horizon, taper_row + t - 1,
-                      horizon->taper_scale * (chain[t] - horizon->taper_keep[i] * chain[t - 1]));
+        for (uint8_t line = 0; t > 0 && line < taper_lines_planned(horizon->config); line++) {
+            count_row(residual, horizon, taper_first_taper_row(horizon->config, line, i) + t - 1,
+                      horizon->taper_scale * (chain[t] - horizon->taper_keep[line][i] * chain[t - 1]));
         }
     }
     count_row(residual, horizon, taper_first_target_row(horizon->config) + i,

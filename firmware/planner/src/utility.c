@@ -19,23 +19,36 @@
 typedef struct {
     const taper_real_t *rate; /* [steps] limits of its powers */
     taper_real_t *energy;     /* [steps] of the iterate, to the end of each step */
-    taper_real_t taper, slope, need;
-    uint8_t steps;
+    taper_real_t taper[TAPER_MAX_TAPER_LINES], slope[TAPER_MAX_TAPER_LINES], need;
+    uint8_t steps, lines;
 } chain_t;
 
 static chain_t chain_of(const taper_planner_t *planner, uint8_t i) {
     const taper_horizon_t *horizon = &planner->horizon;
     const uint8_t steps = horizon->config->steps;
     const size_t first = (size_t)i * steps;
-    return (chain_t){
+    chain_t chain = {
         .rate = planner->rate + first,
         .energy = planner->solver->osqp->solution->x + first,
-        .taper = horizon->upper[taper_first_taper_row(horizon->config) + (size_t)i * (steps - 1U)] /
-                 horizon->taper_scale,
-        .slope = 1 - horizon->taper_keep[i],
         .need = horizon->upper[taper_first_target_row(horizon->config) + i] / horizon->target_scale,
         .steps = steps,
+        .lines = taper_lines_planned(horizon->config),
     };
+    for (uint8_t line = 0; line < chain.lines; line++) {
+        chain.taper[line] =
+            horizon->upper[taper_first_taper_row(horizon->config, line, i)] / horizon->taper_scale;
+        chain.slope[line] = 1 - horizon->taper_keep[line][i];
+    }
+    return chain;
+}
+
+/** What rate and taper allow in step t, after `charged` energy. */
+static taper_real_t allowed_at(const chain_t *chain, uint8_t t, taper_real_t charged) {
+    taper_real_t most = chain->rate[t];
+    for (uint8_t line = 0; line < chain->lines; line++) {
+        most = taper_real_min(most, taper_real_max(chain->taper[line] - chain->slope[line] * charged, 0));
+    }
+    return most;
 }
 
 static taper_real_t power_at(const chain_t *chain, uint8_t t) {
@@ -69,9 +82,8 @@ static void fill_chain(const chain_t *chain, const taper_real_t *level) {
     for (uint8_t t = 0; t < chain->steps; t++) {
         const taper_real_t planned = chain->energy[t] - before;
         before = chain->energy[t];
-        const taper_real_t most =
-            taper_real_min(chain->rate[t], taper_real_max(chain->taper - chain->slope * charged, 0));
-        charged += taper_real_min(planned > LEAST_EXPANDED ? planned : level[t], most);
+        charged +=
+            taper_real_min(planned > LEAST_EXPANDED ? planned : level[t], allowed_at(chain, t, charged));
         chain->energy[t] = charged;
     }
     const taper_real_t room = START_SHARE * chain->need;
@@ -86,13 +98,15 @@ static void rescale_iterate(const taper_planner_t *planner, uint8_t i, taper_rea
     const uint8_t steps = config->steps;
     const OSQPSolution *solution = planner->solver->osqp->solution;
     OSQPFloat *rate_y = solution->y + (size_t)i * steps;
-    OSQPFloat *taper_y = solution->y + taper_first_taper_row(config) + (size_t)i * (steps - 1U);
     for (uint8_t t = 0; t < steps; t++) {
         solution->x[(size_t)i * steps + t] /= unit;
         rate_y[t] *= unit * cost;
     }
-    for (uint8_t t = 0; t + 1 < steps; t++) {
-        taper_y[t] *= unit * cost;
+    for (uint8_t line = 0; line < taper_lines_planned(config); line++) {
+        OSQPFloat *taper_y = solution->y + taper_first_taper_row(config, line, i);
+        for (uint8_t t = 0; t + 1 < steps; t++) {
+            taper_y[t] *= unit * cost;
+        }
     }
     solution->y[taper_first_target_row(config) + i] *= unit * cost;
 }
@@ -130,12 +144,14 @@ static void set_unit(taper_planner_t *planner, uint8_t i, taper_real_t unit) {
     taper_horizon_t *horizon = &planner->horizon;
     const taper_station_config_t *config = horizon->config;
     const uint8_t steps = config->steps;
-    taper_real_t *taper = horizon->upper + taper_first_taper_row(config) + (size_t)i * (steps - 1U);
     for (uint8_t t = 0; t < steps; t++) {
         horizon->upper[(size_t)i * steps + t] /= unit;
     }
-    for (uint8_t t = 0; t + 1 < steps; t++) {
-        taper[t] /= taper[t] < TAPER_REAL_UNBOUNDED ? unit : 1;
+    for (uint8_t line = 0; line < taper_lines_planned(config); line++) {
+        taper_real_t *taper = horizon->upper + taper_first_taper_row(config, line, i);
+        for (uint8_t t = 0; t + 1 < steps; t++) {
+            taper[t] /= taper[t] < TAPER_REAL_UNBOUNDED ? unit : 1;
+        }
     }
     horizon->upper[taper_first_target_row(config) + i] /= unit;
     for (uint16_t r = 0; r < horizon->sum_count; r++) {

@@ -26,8 +26,9 @@ static void shift_vehicle(const taper_planner_t *planner, uint8_t i, uint8_t shi
         chain[t] -= charged;
     }
     shift_block(y + (size_t)i * steps, steps, shift, growth);
-    shift_block(y + taper_first_taper_row(config) + (size_t)i * (steps - 1U), (uint8_t)(steps - 1), shift,
-                growth);
+    for (uint8_t line = 0; line < taper_lines_planned(config); line++) {
+        shift_block(y + taper_first_taper_row(config, line, i), (uint8_t)(steps - 1), shift, growth);
+    }
     y[taper_first_target_row(config) + i] *= growth;
 }
 
@@ -38,7 +39,9 @@ static void clear_vehicle(const taper_planner_t *planner, uint8_t i) {
     OSQPFloat *y = planner->solver->osqp->solution->y;
     clear_block(planner->solver->osqp->solution->x + (size_t)i * steps, steps);
     clear_block(y + (size_t)i * steps, steps);
-    clear_block(y + taper_first_taper_row(config) + (size_t)i * (steps - 1U), (uint8_t)(steps - 1));
+    for (uint8_t line = 0; line < taper_lines_planned(config); line++) {
+        clear_block(y + taper_first_taper_row(config, line, i), (uint8_t)(steps - 1));
+    }
     y[taper_first_target_row(config) + i] = 0;
 }
 

@@ -72,12 +72,27 @@ static bool set_is_whole(const taper_session_t *session) {
            p->a.revision == p->c.revision && p->a.session == p->b.session;
 }
 
-/* The taper that belongs to the received set, or absent. */
-static int32_t matching_taper_W(const taper_session_t *session) {
-    const taper_ev_params_t *p = &session->received;
-    const bool matches = (session->param_seen & PARAM_D) != 0u && p->d.revision == p->a.revision &&
-                         p->d.session == p->a.session;
-    return matches ? p->d.taper_W : TAPER_ABSENT;
+/* Whether D or E, of this revision and session, belongs to the received set. */
+static bool belongs(const taper_session_t *session, unsigned part, uint8_t revision, uint8_t number) {
+    const taper_ev_param_a_t *a = &session->received.a;
+    return (session->param_seen & part) != 0u && revision == a->revision && number == a->session;
+}
+
+/* The received set, with an absent taper where none belongs to it. */
+static taper_ev_params_t whole_set(const taper_session_t *session) {
+    taper_ev_params_t set = session->received;
+    if (!belongs(session, PARAM_D, set.d.revision, set.d.session)) {
+        set.d.taper_W = TAPER_ABSENT;
+    }
+    if (!belongs(session, PARAM_E, set.e.revision, set.e.session)) {
+        set.e.peak_W = TAPER_ABSENT;
+        set.e.taper_W = TAPER_ABSENT;
+    }
+    return set;
+}
+
+static bool tapers_differ(const taper_ev_params_t *a, const taper_ev_params_t *b) {
+    return a->d.taper_W != b->d.taper_W || a->e.peak_W != b->e.peak_W || a->e.taper_W != b->e.taper_W;
 }
 
 /* A vehicle was plugged in, or replaced by another session number. What was reported before was not about it; only its
@@ -151,15 +166,14 @@ static void use_parameters(taper_session_table_t *table, taper_session_t *sessio
         taper_session_drop(table, session, now_ms);
     }
     taper_session_confirm(table, (uint8_t)(session - table->session));
-    const int32_t taper_W = matching_taper_W(session);
+    const taper_ev_params_t set = whole_set(session);
     const bool begins = !session->in_session;
-    const bool is_new = begins || session->received.a.revision != session->used.a.revision;
-    if (is_new || taper_W != session->used.d.taper_W) {
+    const bool is_new = begins || set.a.revision != session->used.a.revision;
+    if (is_new || tapers_differ(&set, &session->used)) {
         table->revision++;
         table->changes++;
     }
-    session->used = session->received;
-    session->used.d.taper_W = taper_W;
+    session->used = set;
     session->in_session = true;
     session->unproved = false;
     if (is_new) {
@@ -218,38 +232,33 @@ static void apply_elec(taper_session_table_t *table, taper_session_t *session, c
     hear(&session->elec_heard, now_ms);
 }
 
-/* Number of the session in A, B or D. */
-static uint8_t session_of(const taper_message_t *message) {
+/* Note one of the frames. @return its bit of `param_seen`. */
+static unsigned note_part(taper_ev_params_t *received, const taper_message_t *message) {
     switch (message->kind) {
-    case TAPER_MESSAGE_EV_PARAM_A: return message->as.ev_param_a.session;
-    case TAPER_MESSAGE_EV_PARAM_B: return message->as.ev_param_b.session;
-    default: return message->as.ev_param_d.session;
+    case TAPER_MESSAGE_EV_PARAM_A: received->a = message->as.ev_param_a; return PARAM_A;
+    case TAPER_MESSAGE_EV_PARAM_B: received->b = message->as.ev_param_b; return PARAM_B;
+    case TAPER_MESSAGE_EV_PARAM_C: received->c = message->as.ev_param_c; return PARAM_C;
+    case TAPER_MESSAGE_EV_PARAM_D: received->d = message->as.ev_param_d; return PARAM_D;
+    default: received->e = message->as.ev_param_e; return PARAM_E;
+    }
+}
+
+/* Number of the session in one of the frames that have it: all but C. */
+static uint8_t session_of(const taper_ev_params_t *received, unsigned part) {
+    switch (part) {
+    case PARAM_A: return received->a.session;
+    case PARAM_B: return received->b.session;
+    case PARAM_D: return received->d.session;
+    default: return received->e.session;
     }
 }
 
 static void apply_parameters(taper_session_table_t *table, taper_session_t *session,
                              const taper_message_t *message, uint32_t now_ms) {
-    unsigned part = 0;
-    switch (message->kind) {
-    case TAPER_MESSAGE_EV_PARAM_A:
-        session->received.a = message->as.ev_param_a;
-        part = PARAM_A;
-        break;
-    case TAPER_MESSAGE_EV_PARAM_B:
-        session->received.b = message->as.ev_param_b;
-        part = PARAM_B;
-        break;
-    case TAPER_MESSAGE_EV_PARAM_C:
-        session->received.c = message->as.ev_param_c;
-        part = PARAM_C;
-        break;
-    default:
-        session->received.d = message->as.ev_param_d;
-        part = PARAM_D;
-        break;
-    }
+    const unsigned part = note_part(&session->received, message);
     session->param_seen = (uint8_t)(session->param_seen | part);
-    if (session->awaited && part != PARAM_C && session_of(message) != session->used.a.session) {
+    if (session->awaited && part != PARAM_C &&
+        session_of(&session->received, part) != session->used.a.session) {
         taper_session_drop(table, session, now_ms);
         session->param_seen =
             (uint8_t)(session->param_seen | part); /* this one is of the session that is there */
@@ -335,7 +344,8 @@ bool taper_session_apply_to(taper_session_table_t *table, uint8_t connector, con
     case TAPER_MESSAGE_EV_PARAM_A:
     case TAPER_MESSAGE_EV_PARAM_B:
     case TAPER_MESSAGE_EV_PARAM_C:
-    case TAPER_MESSAGE_EV_PARAM_D: apply_parameters(table, session, message, now_ms); break;
+    case TAPER_MESSAGE_EV_PARAM_D:
+    case TAPER_MESSAGE_EV_PARAM_E: apply_parameters(table, session, message, now_ms); break;
     default: return false;
     }
     return true;

@@ -12,6 +12,7 @@
 #define PARAM_B 0x2u
 #define PARAM_C 0x4u
 #define PARAM_D 0x8u
+#define PARAM_E 0x10u
 
 /** Whether a report was made, and no longer than `timeout_ms` ago. */
 static inline bool taper_session_is_fresh(taper_heard_t heard, uint32_t now_ms, uint32_t timeout_ms) {

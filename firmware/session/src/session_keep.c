@@ -56,13 +56,15 @@ static bool account_is_sound(const taper_session_kept_t *kept) {
            is_told_within(kept->anchor_Wh, 0, ENERGY_MOST_Wh) && kept->stay_s <= STAY_MOST_s;
 }
 
-/** One session number and one revision for all four. */
+/** One session number and one revision for all; no second line of the taper. */
 static taper_ev_params_t agreeing(taper_ev_params_t p) {
     p.b.session = p.a.session;
     p.d.session = p.a.session;
     p.b.revision = p.a.revision;
     p.c.revision = p.a.revision;
     p.d.revision = p.a.revision;
+    p.e = (taper_ev_param_e_t){
+        .revision = p.a.revision, .session = p.a.session, .peak_W = TAPER_ABSENT, .taper_W = TAPER_ABSENT};
     return p;
 }
 

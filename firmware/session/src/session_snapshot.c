@@ -192,7 +192,10 @@ static void fill_battery(taper_demand_t *demand, const taper_session_t *session,
         demand->peak_W = taper_demand_allowed_W(demand);
     }
     if (demand->capacity_Wh > 0) {
+        const taper_ev_param_e_t *second = &session->used.e;
         demand->taper_W = taper_clamp_i32(session->used.d.taper_W, 0, demand->peak_W); /* absent becomes 0 */
+        demand->second_peak_W = taper_max_i32(second->peak_W, 0);
+        demand->second_taper_W = taper_clamp_i32(second->taper_W, 0, demand->second_peak_W);
     }
 }
 

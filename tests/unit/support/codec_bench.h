@@ -6,7 +6,7 @@
 
 #include "taper/codec.h"
 
-#define CODEC_BENCH_KINDS 17
+#define CODEC_BENCH_KINDS 18
 /** Every kind of message. */
 extern const taper_message_kind_t codec_bench_kinds[CODEC_BENCH_KINDS];
 
@@ -22,8 +22,8 @@ taper_frame_t codec_bench_encode(const taper_message_t *message);
 /** No field may be bad. */
 taper_message_t codec_bench_decode(const taper_frame_t *frame);
 
-/** Ten kinds of connectors, five of one node, and EMCY of connectors, gateway and controller. */
-#define CODEC_BENCH_IDS (11 * 60 + 5 + 62)
+/** Twelve kinds of connectors, five of one node, and EMCY of connectors, gateway and controller. */
+#define CODEC_BENCH_IDS (12 * 60 + 5 + 62)
 /** Every identifier that is decoded; fails the running test if there are not so many. */
 void codec_bench_identifiers(uint16_t ids[CODEC_BENCH_IDS]);
 

@@ -48,6 +48,7 @@ void bench_start(session_bench_t *bench, uint8_t connector) {
     bench->c = (taper_ev_param_c_t){
         .revision = 1, .target_Wh = 20000, .maximum_Wh = TAPER_ABSENT, .minimum_Wh = TAPER_ABSENT};
     bench->d = (taper_ev_param_d_t){.revision = 1, .session = 7, .taper_W = 4400};
+    bench->e = (taper_ev_param_e_t){.revision = 1, .session = 7, .peak_W = 20000, .taper_W = 18000};
     taper_session_init(&bench->table, &station);
 }
 
@@ -102,6 +103,12 @@ void bench_report_d(session_bench_t *bench) {
     (void)taper_session_apply(&bench->table, &m, bench->now_ms);
 }
 
+void bench_report_e(session_bench_t *bench) {
+    taper_message_t m = message(bench, TAPER_MESSAGE_EV_PARAM_E);
+    m.as.ev_param_e = bench->e;
+    (void)taper_session_apply(&bench->table, &m, bench->now_ms);
+}
+
 void bench_report_parameters(session_bench_t *bench) {
     bench_report_a(bench);
     bench_report_b(bench);
@@ -121,6 +128,7 @@ void bench_next_revision(session_bench_t *bench) {
     bench->b.revision = bench->a.revision;
     bench->c.revision = bench->a.revision;
     bench->d.revision = bench->a.revision;
+    bench->e.revision = bench->a.revision;
 }
 
 void bench_unplug(session_bench_t *bench) {

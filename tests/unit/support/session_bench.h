@@ -24,6 +24,7 @@ typedef struct {
     taper_ev_param_b_t b;
     taper_ev_param_c_t c;
     taper_ev_param_d_t d;
+    taper_ev_param_e_t e;      /**< sent by bench_report_e() alone */
     taper_snapshot_t snapshot; /**< of the last bench_demand() */
 } session_bench_t;
 
@@ -40,6 +41,7 @@ void bench_report_a(session_bench_t *bench);
 void bench_report_b(session_bench_t *bench);
 void bench_report_c(session_bench_t *bench);
 void bench_report_d(session_bench_t *bench);
+void bench_report_e(session_bench_t *bench);
 /** A, B, C and D. */
 void bench_report_parameters(session_bench_t *bench);
 /** Everything, in the order of the bus. */

@@ -34,7 +34,7 @@
 #include "taper/types.h"
 
 /** All protected frames that a connector, or the gateway, can send: the number of end-to-end receivers. */
-#define TAPER_CONNECTOR_RECEIVERS 9
+#define TAPER_CONNECTOR_RECEIVERS 10
 #define TAPER_GATEWAY_RECEIVERS   4
 /** Steps ahead that PLAN tells. */
 #define TAPER_PLAN_STEPS 3

@@ -5,7 +5,9 @@
  *
  *     limit(x) = peak - taper * x / capacity,  never below 0
  *
- * with x the energy in the battery. A vehicle of unknown capacity has no taper.
+ * with x the energy in the battery; the lower one, where there is a second line (`second_peak_W`, `second_taper_W`). With the
+ * flat limit of connector and vehicle (`max_mA`), above which a line may begin, this is a concave limit of two or three
+ * pieces: flat, then tapered. A vehicle of unknown capacity has no taper.
  */
 #ifndef TAPER_BATTERY_H
 #define TAPER_BATTERY_H

@@ -34,7 +34,8 @@
  * voltage, per power of the vehicle. A connector is in a row if its description says so; what the snapshot says changes
  * its c_ri, to 0 too, but puts it into no other row.
  *
- * The variable (i,t) has index i*T + t. Rows stand in the order rate [N*T], taper [N*(T-1)], target [N], sum [R*T].
+ * The variable (i,t) has index i*T + t. Rows stand in the order rate [N*T], taper [N*(T-1)], the same again of the second
+ * lines where the station plans with two (`taper_lines`), target [N], sum [R*T].
  * What does not apply is masked by bounds (l = u, or unbounded), never by the cost: that converges 2-5 times faster.
  * A rate is also limited by the site's limits, which says nothing new but lets a limit of 0 converge at once.
  * Target and sum rows are scaled as below, which saves about a third of the iterations.
@@ -65,7 +66,8 @@
 #define TAPER_CURRENT_SCALE ((taper_real_t)0.4)
 
 #define TAPER_MAX_VARIABLES (TAPER_MAX_CONNECTORS * TAPER_MAX_STEPS)
-#define TAPER_MAX_ROWS      (2 * TAPER_MAX_VARIABLES + TAPER_MAX_PLAN_ROWS * TAPER_MAX_STEPS)
+#define TAPER_MAX_ROWS \
+    ((1 + TAPER_MAX_TAPER_LINES) * TAPER_MAX_VARIABLES + TAPER_MAX_PLAN_ROWS * TAPER_MAX_STEPS)
 
 /** One limit, in every step: T sum rows. */
 typedef struct {
@@ -85,7 +87,8 @@ typedef struct {
     taper_real_t linear[TAPER_MAX_VARIABLES]; /**< linear cost; of the log utility the planner's to write */
     taper_real_t lower[TAPER_MAX_ROWS];       /**< row bounds; +-TAPER_REAL_UNBOUNDED: none */
     taper_real_t upper[TAPER_MAX_ROWS];
-    taper_real_t taper_keep[TAPER_MAX_CONNECTORS]; /**< 1 - a_i: taper row (i,t) is v(i,t) - keep v(i,t-1) */
+    taper_real_t taper_keep[TAPER_MAX_TAPER_LINES]
+                           [TAPER_MAX_CONNECTORS]; /**< 1 - a_i: taper row (i,t) is v(i,t) - keep v(i,t-1) */
     bool waits
         [TAPER_MAX_CONNECTORS]; /**< for a lower price, with time to spare: more than planned is of no use */
     uint16_t sum_count;
@@ -113,15 +116,23 @@ taper_real_t taper_horizon_hessian_diagonal(uint8_t steps, uint8_t t);
 /** Quadratic cost on v(i,t-1) v(i,t) (off the diagonal of the Hessian), t >= 1. */
 taper_real_t taper_horizon_hessian_neighbour(uint8_t t);
 
-/** First of the taper, target and sum rows; the rate rows begin at 0. */
-static inline size_t taper_first_taper_row(const taper_station_config_t *config) {
-    return (size_t)config->connector_count * config->steps;
+/** Lines of the taper that the station plans with, 1..TAPER_MAX_TAPER_LINES. */
+static inline uint8_t taper_lines_planned(const taper_station_config_t *config) {
+    return TAPER_MAX_TAPER_LINES > 1 && config->planning.taper_lines > 1 ? 2 : 1;
 }
+
+/** First of the taper rows of connector `i` by line `line`: one for each step t >= 1. The rate rows begin at 0. */
+static inline size_t taper_first_taper_row(const taper_station_config_t *config, uint8_t line, uint8_t i) {
+    const size_t connectors = config->connector_count;
+    return connectors * config->steps + (line * connectors + i) * (config->steps - 1U);
+}
+
+/** First of the target and sum rows. */
 static inline size_t taper_first_target_row(const taper_station_config_t *config) {
-    return (size_t)config->connector_count * (2U * config->steps - 1U);
+    return taper_first_taper_row(config, taper_lines_planned(config), 0);
 }
 static inline size_t taper_first_sum_row(const taper_station_config_t *config) {
-    return (size_t)config->connector_count * 2U * config->steps;
+    return taper_first_target_row(config) + config->connector_count;
 }
 
 #endif

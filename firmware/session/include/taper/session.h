@@ -58,6 +58,7 @@ typedef struct {
     taper_ev_param_b_t b;
     taper_ev_param_c_t c;
     taper_ev_param_d_t d;
+    taper_ev_param_e_t e;
 } taper_ev_params_t;
 
 /** One connector. Private to the layer; in the header because the caller owns the memory. */
@@ -69,21 +70,21 @@ typedef struct {
     taper_evse_info_t info; /**< of the connector, whichever vehicle is there */
     bool info_known;
     taper_ev_params_t received; /**< newest of each frame; they may disagree */
-    taper_ev_params_t used;     /**< last set that agreed; `d.taper_W` is absent unless D agreed as well */
-    uint8_t param_seen;         /**< bit 0: A .. bit 3: D received since the vehicle came */
-    bool vehicle_there;         /**< by the last EVSE_STATUS */
-    bool in_session;            /**< `used` is set */
-    bool lost;                  /**< its heartbeat was there and is gone */
-    bool wants_energy;          /**< `active` of its demand at the last update */
-    uint32_t plugged_in_ms;     /**< when the vehicle, or else the session, was first seen */
-    int32_t session_Wh;         /**< last energy measured in this session, or absent */
-    int32_t stored_Wh;          /**< estimate, absent until SOC and capacity are known */
-    int32_t stored_of_Wh;       /**< capacity that the estimate was made for */
-    int32_t anchor_Wh;          /**< session energy at which `stored_Wh` was right, absent until measured */
-    int32_t jump_permille;      /**< last SOC that was not believed */
-    uint8_t jump_count;         /**< reports that agreed on it, in a row */
-    bool soc_is_new;            /**< an EV_STATUS came since the last update */
-    bool kept;                  /**< it began before a restart, and so the following: */
+    taper_ev_params_t used; /**< last set that agreed; absent unless D or E agreed as well: what they say */
+    uint8_t param_seen;     /**< bit 0: A .. bit 4: E received since the vehicle came */
+    bool vehicle_there;     /**< by the last EVSE_STATUS */
+    bool in_session;        /**< `used` is set */
+    bool lost;              /**< its heartbeat was there and is gone */
+    bool wants_energy;      /**< `active` of its demand at the last update */
+    uint32_t plugged_in_ms; /**< when the vehicle, or else the session, was first seen */
+    int32_t session_Wh;     /**< last energy measured in this session, or absent */
+    int32_t stored_Wh;      /**< estimate, absent until SOC and capacity are known */
+    int32_t stored_of_Wh;   /**< capacity that the estimate was made for */
+    int32_t anchor_Wh;      /**< session energy at which `stored_Wh` was right, absent until measured */
+    int32_t jump_permille;  /**< last SOC that was not believed */
+    uint8_t jump_count;     /**< reports that agreed on it, in a row */
+    bool soc_is_new;        /**< an EV_STATUS came since the last update */
+    bool kept;              /**< it began before a restart, and so the following: */
     bool awaited;    /**< kept from before a restart, and not confirmed yet: `used`, but nobody's demand */
     bool unproved;   /**< kept from before a restart, and its parameters were not told since */
     bool meter_open; /**< and its meter was not heard since */
@@ -92,7 +93,8 @@ typedef struct {
 
 /** What of a session has to outlive a restart. */
 typedef struct {
-    taper_ev_params_t used; /**< revision and session of A stand for those of the others */
+    taper_ev_params_t
+        used;      /**< revision and session of A stand for those of the others; not E, see restoring */
     uint8_t error; /**< of the last EV_STATUS, and what it asked for: a vehicle that is done falls asleep */
     bool complete, pause_requested, stop_requested;
     int32_t session_Wh; /**< as in taper_session_t */
@@ -175,7 +177,8 @@ bool taper_session_keep(const taper_session_table_t *table, uint8_t connector, u
 
 /**
  * Await a session that was kept, on a table that has heard nothing yet; its time is 0. Quantities out of the range of their
- * messages are not believed. @return false: nothing of it is used. Cost: constant.
+ * messages are not believed. A second line of the taper is not restored: it is told again within 2 s, until when the first one
+ * counts. @return false: nothing of it is used. Cost: constant.
  */
 bool taper_session_restore(taper_session_table_t *table, uint8_t connector, const taper_session_kept_t *kept);
 

@@ -84,7 +84,7 @@ typedef struct {
 
 /** EV_PARAM_A, connector to controller, 2 s and on change. */
 typedef struct {
-    uint8_t revision; /**< 0..15, changes with any of A..D and with every new session */
+    uint8_t revision; /**< 0..15, changes with any of A..E and with every new session */
     uint8_t session;
     int32_t capacity_Wh;          /**< 100..6 553 400, or absent */
     int32_t soc_target_permille;  /**< 0..1000, or absent */
@@ -96,7 +96,7 @@ typedef struct {
     uint8_t revision;
     uint8_t session;
     int32_t departure_min; /**< 0..65534: Unix minutes modulo 65535, or absent */
-    int32_t peak_W;        /**< 0..655 340: most the vehicle takes at SOC 0, or absent */
+    int32_t peak_W;        /**< 0..655 340: of the taper's line, at SOC 0, or absent */
     int32_t min_mA;        /**< 0..127 000, or absent */
 } taper_ev_param_b_t;
 
@@ -113,6 +113,14 @@ typedef struct {
     uint8_t session;
     int32_t taper_W; /**< 0..655 340: fall of the maximum power from SOC 0 to SOC 1, or absent: unknown */
 } taper_ev_param_d_t;
+
+/** EV_PARAM_E: a second line of the taper; the vehicle takes no more than the lower one. */
+typedef struct {
+    uint8_t revision;
+    uint8_t session;
+    int32_t peak_W;  /**< 0..655 340: at SOC 0, or absent; 0 or absent: there is no second line */
+    int32_t taper_W; /**< 0..655 340: fall from SOC 0 to SOC 1, or absent: none */
+} taper_ev_param_e_t;
 
 /** EMCY, any node, event: 3 x at 20 ms, then every second while it lasts. */
 typedef struct {
@@ -186,6 +194,7 @@ typedef struct {
         taper_ev_param_b_t ev_param_b;
         taper_ev_param_c_t ev_param_c;
         taper_ev_param_d_t ev_param_d;
+        taper_ev_param_e_t ev_param_e;
     } as;
 } taper_message_t;
 

@@ -142,6 +142,7 @@ typedef struct {
     bool
         on_events; /**< the paper's rule: plan anew only when a vehicle comes, leaves or reaches its target, or a limit
                             changes, and follow the plan in between */
+    uint8_t taper_lines; /**< of a vehicle that are planned with, 1 or 2; 0: 1. The solver is generated for as many */
     bool learns_taper;             /**< from what vehicles accept; what they tell is a first guess */
     int32_t lambda_milli_per_kWh2; /**< of the log utility: weight of the squared energy missing, >= 0 */
 } taper_planning_t;
@@ -200,8 +201,10 @@ typedef struct {
     int32_t stored_Wh;       /**< energy in the battery, >= 0; 0 if SOC or capacity is unknown */
     int32_t capacity_Wh;     /**< > 0, or 0: unknown (no taper then) */
     int32_t need_Wh;         /**< energy still wanted, > 0 */
-    int32_t peak_W;          /**< what the vehicle takes at SOC 0, >= 0 */
+    int32_t peak_W;          /**< line of the taper, at SOC 0, >= 0; may be above what `max_mA` allows */
     int32_t taper_W;         /**< fall of that from SOC 0 to SOC 1, 0..peak_W */
+    int32_t second_peak_W;   /**< another such line, of which the lower one counts; 0: there is none */
+    int32_t second_taper_W;  /**< 0..second_peak_W */
     int32_t max_mA;          /**< least of connector and vehicle limit, per phase */
     int32_t min_mA;          /**< greatest of connector and vehicle minimum */
     int32_t W_per_A;         /**< power of 1 A on each phase in use, > 0 */
@@ -212,6 +215,24 @@ typedef struct {
 /** What connector and vehicle allow, whatever the battery takes [W]. */
 static inline int32_t taper_demand_allowed_W(const taper_demand_t *demand) {
     return taper_saturate_i32(taper_quotient((int64_t)demand->max_mA * demand->W_per_A, 1000));
+}
+
+/** A line of the taper at the present charge, >= 0 and rounded up [W]. */
+static inline int32_t taper_demand_line_W(const taper_demand_t *demand, int32_t peak_W, int32_t taper_W) {
+    const int64_t fall_W = taper_quotient((int64_t)taper_W * demand->stored_Wh, demand->capacity_Wh);
+    return fall_W >= peak_W ? 0 : taper_saturate_i32(peak_W - fall_W);
+}
+
+/** What the battery takes at its present charge (taper/battery.h has the model), >= 0 and rounded up [W]. */
+static inline int32_t taper_demand_battery_W(const taper_demand_t *demand) {
+    if (demand->capacity_Wh <= 0) {
+        return demand->peak_W;
+    }
+    const int32_t first_W = taper_demand_line_W(demand, demand->peak_W, demand->taper_W);
+    return demand->second_peak_W <= 0
+               ? first_W
+               : taper_min_i32(first_W,
+                               taper_demand_line_W(demand, demand->second_peak_W, demand->second_taper_W));
 }
 
 /** All demands at one instant: the only thing that horizon and fallback see of the world. */
