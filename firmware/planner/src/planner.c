@@ -199,11 +199,13 @@ static uint8_t outer_iterations(const taper_planner_t *planner) {
 
 /** Log utility: from one quadratic programme to the next. The answer of the last one is a plan, whatever comes of this. */
 static void go_on(taper_planner_t *planner) {
-    const bool is_last = planner->outer + 1 >= outer_iterations(planner);
+    const bool usable = taper_planner_is_usable(planner->verdict);
+    const bool is_last =
+        planner->outer + 1 >= outer_iterations(planner) || (usable && taper_utility_has_settled(planner));
     const bool is_late = planner->verdict == TAPER_VERDICT_SOLVING && planner->iterations >= OUTER_ITERATIONS;
     if (planner->verdict == TAPER_VERDICT_LATE && planner->outer > 0) {
         planner->verdict = TAPER_VERDICT_INACCURATE;
-    } else if (!is_last && (is_late || taper_planner_is_usable(planner->verdict))) {
+    } else if (!is_last && (is_late || usable)) {
         if (is_late) {
             taper_store_iterates(planner->solver->osqp);
         }

@@ -12,6 +12,8 @@
 #define LEAST_EXPANDED ((taper_real_t)(TAPER_REAL_IS_DOUBLE ? 1e-4 : 1e-3))
 /** Part of the need that a starting point gives at most: with all of it, the last powers would be 0. */
 #define START_SHARE ((taper_real_t)0.99)
+/** A programme that changes no power by more than this share was the last that is of use: Newton's error is its square. */
+#define SETTLED ((taper_real_t)0.003)
 /** Each round of water filling settles those whose limit is below the level. */
 #define FILL_ROUNDS 8
 
@@ -30,7 +32,7 @@ static chain_t chain_of(const taper_planner_t *planner, uint8_t i) {
     chain_t chain = {
         .rate = planner->rate + first,
         .energy = planner->solver->osqp->solution->x + first,
-        .need = horizon->upper[taper_first_target_row(horizon->config) + i] / horizon->target_scale,
+        .need = planner->need[i],
         .steps = steps,
         .lines = taper_lines_planned(horizon->config),
     };
@@ -49,6 +51,28 @@ static taper_real_t allowed_at(const chain_t *chain, uint8_t t, taper_real_t cha
         most = taper_real_min(most, taper_real_max(chain->taper[line] - chain->slope[line] * charged, 0));
     }
     return most;
+}
+
+/** Greatest power that its taper lets a fresh vehicle keep in all its steps. */
+static taper_real_t even_power(const chain_t *chain) {
+    taper_real_t steps = 0, even = TAPER_REAL_UNBOUNDED;
+    for (uint8_t t = 0; t < chain->steps; t++) {
+        steps += chain->rate[t] > 0 ? 1 : 0;
+    }
+    for (uint8_t line = 0; line < chain->lines; line++) {
+        even = taper_real_min(even,
+                              chain->taper[line] / (1 + chain->slope[line] * taper_real_max(steps - 1, 0)));
+    }
+    return even;
+}
+
+/** Most energy that rate and taper let it have. */
+static taper_real_t reachable(const chain_t *chain) {
+    taper_real_t charged = 0;
+    for (uint8_t t = 0; t < chain->steps; t++) {
+        charged += allowed_at(chain, t, charged);
+    }
+    return charged;
 }
 
 static taper_real_t power_at(const chain_t *chain, uint8_t t) {
@@ -78,12 +102,13 @@ static taper_real_t level_of(const taper_planner_t *planner, uint8_t t) {
 
 /** Powers for a vehicle, forward in time: those of the last plan, else the level; at least something, within its limits. */
 static void fill_chain(const chain_t *chain, const taper_real_t *level) {
+    const taper_real_t even = even_power(chain);
     taper_real_t before = 0, charged = 0;
     for (uint8_t t = 0; t < chain->steps; t++) {
         const taper_real_t planned = chain->energy[t] - before;
         before = chain->energy[t];
-        charged +=
-            taper_real_min(planned > LEAST_EXPANDED ? planned : level[t], allowed_at(chain, t, charged));
+        const taper_real_t wanted = planned > LEAST_EXPANDED ? planned : taper_real_min(level[t], even);
+        charged += taper_real_min(wanted, allowed_at(chain, t, charged));
         chain->energy[t] = charged;
     }
     const taper_real_t room = START_SHARE * chain->need;
@@ -154,6 +179,7 @@ static void set_unit(taper_planner_t *planner, uint8_t i, taper_real_t unit) {
         }
     }
     horizon->upper[taper_first_target_row(config) + i] /= unit;
+    planner->need[i] /= unit;
     for (uint16_t r = 0; r < horizon->sum_count; r++) {
         horizon->weight[r][i] *= unit;
     }
@@ -189,10 +215,27 @@ static void keep_rates(taper_planner_t *planner) {
            (size_t)config->connector_count * config->steps * sizeof planner->rate[0]);
 }
 
+/**
+ * Keep what every vehicle needs, and bound its energy by what it can reach, if that is less. This says nothing new, but one
+ * multiplier then carries what rate or taper rows of all steps have in common: lambda makes that large.
+ */
+static void bound_energies(taper_planner_t *planner) {
+    taper_horizon_t *horizon = &planner->horizon;
+    taper_real_t *target = horizon->upper + taper_first_target_row(horizon->config);
+    for (uint8_t i = 0; i < horizon->config->connector_count; i++) {
+        planner->need[i] = target[i] / horizon->target_scale;
+        const chain_t chain = chain_of(planner, i);
+        target[i] = target[i] < TAPER_REAL_UNBOUNDED / 2
+                        ? taper_real_min(target[i], reachable(&chain) * horizon->target_scale)
+                        : target[i];
+    }
+}
+
 void taper_utility_begin(taper_planner_t *planner) {
     const taper_station_config_t *config = planner->horizon.config;
     taper_real_t level[TAPER_MAX_STEPS];
     keep_rates(planner);
+    bound_energies(planner);
     for (uint8_t t = 0; t < config->steps; t++) {
         level[t] = level_of(planner, t);
     }
@@ -259,4 +302,19 @@ taper_written_t taper_utility_expand(taper_planner_t *planner) {
         write_cost(planner, &hessian, i, &chain, point);
     }
     return hessian.written;
+}
+
+bool taper_utility_has_settled(const taper_planner_t *planner) {
+    const taper_real_t *lower = planner->horizon.lower;
+    for (uint8_t i = 0; i < planner->solver->connectors; i++) {
+        const chain_t chain = chain_of(planner, i);
+        for (uint8_t t = 0; t < chain.steps; t++) {
+            const taper_real_t before = lower[(size_t)i * chain.steps + t] * STEP_FACTOR;
+            const taper_real_t change = fabs(power_at(&chain, t) - before);
+            if (chain.rate[t] > 0 && change > SETTLED * before + LEAST_EXPANDED) {
+                return false;
+            }
+        }
+    }
+    return true;
 }

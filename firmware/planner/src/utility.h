@@ -31,4 +31,7 @@ void taper_utility_end(taper_planner_t *planner);
  */
 taper_written_t taper_utility_expand(taper_planner_t *planner);
 
+/** Whether the answer in `solution->x` differs so little from what it was expanded around that another would change nothing. */
+bool taper_utility_has_settled(const taper_planner_t *planner);
+
 #endif

@@ -60,8 +60,9 @@ typedef struct {
     uint8_t session[TAPER_MAX_CONNECTORS]; /**< whose trajectory the warm start holds; 0: nobody's */
     taper_real_t
         rate[TAPER_MAX_VARIABLES]; /**< log utility: rate limits, without those of the next step's length */
-    taper_real_t cost_scale;       /**< log utility: factor of the whole cost */
-    bool matrix_is_current;        /**< the solver's factorisation is that of its matrices' values */
+    taper_real_t need[TAPER_MAX_CONNECTORS]; /**< log utility: energy wanted, in the horizon's units */
+    taper_real_t cost_scale;                 /**< log utility: factor of the whole cost */
+    bool matrix_is_current; /**< the solver's factorisation is that of its matrices' values */
 } taper_planner_t;
 
 /**
