@@ -29,6 +29,18 @@ static void test_the_limit_is_never_negative(void) {
     TEST_ASSERT_EQUAL_INT32(0, taper_battery_limit_W(&demand));
 }
 
+static void test_the_limits_that_the_planner_takes_are_not_in_whole_watts(void) {
+    taper_demand_t demand = tapered(59996);
+    demand.second_peak_W = 20000;
+    demand.second_taper_W = 19999;
+    TEST_ASSERT_EQUAL_INT32(3, taper_battery_limit_W(&demand));
+    TEST_ASSERT_FLOAT_WITHIN(0.01F, 1360.4F, (float)taper_battery_line_now_W(&demand, 0));
+    TEST_ASSERT_FLOAT_WITHIN(0.02F, 2.33F, (float)taper_battery_line_now_W(&demand, 1));
+    demand.taper_W = 7360;
+    demand.stored_Wh = 90000;
+    TEST_ASSERT_TRUE(taper_battery_line_now_W(&demand, 0) == 0);
+}
+
 static taper_demand_t of_two_lines(int32_t stored_Wh) {
     taper_demand_t demand = tapered(stored_Wh); /* 7360 - 6000 SOC */
     demand.second_peak_W = 20000;
@@ -51,9 +63,9 @@ static void test_of_two_lines_the_lower_one_counts(void) {
 static void test_each_line_by_itself(void) {
     const taper_demand_t demand = of_two_lines(54000);
     const taper_demand_t one = tapered(54000);
-    TEST_ASSERT_EQUAL_INT32(1960, taper_battery_line_W(&demand, 0));
-    TEST_ASSERT_EQUAL_INT32(2180, taper_battery_line_W(&demand, 1));
-    TEST_ASSERT_EQUAL_INT32(TAPER_NO_LIMIT, taper_battery_line_W(&one, 1));
+    TEST_ASSERT_FLOAT_WITHIN(0.01F, 1960, (float)taper_battery_line_now_W(&demand, 0));
+    TEST_ASSERT_FLOAT_WITHIN(0.01F, 2180, (float)taper_battery_line_now_W(&demand, 1));
+    TEST_ASSERT_TRUE(taper_battery_line_now_W(&one, 1) >= TAPER_REAL_UNBOUNDED);
     const taper_real_t per_mille = taper_battery_slope_per_h(&demand, 1) * 1000; /* 19.8 kW over 60 kWh */
     TEST_ASSERT_TRUE(per_mille > (taper_real_t)329.9 && per_mille < (taper_real_t)330.1);
 }
@@ -71,6 +83,7 @@ static void test_an_unknown_capacity_means_no_taper(void) {
     taper_demand_t demand = tapered(30000);
     demand.capacity_Wh = 0;
     TEST_ASSERT_EQUAL_INT32(7360, taper_battery_limit_W(&demand));
+    TEST_ASSERT_TRUE(taper_battery_line_now_W(&demand, 0) == 7360);
     TEST_ASSERT_TRUE(taper_battery_slope_per_h(&demand, 0) == 0);
 }
 
@@ -126,6 +139,7 @@ int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_the_limit_falls_on_a_line_from_the_peak);
     RUN_TEST(test_the_limit_is_never_negative);
+    RUN_TEST(test_the_limits_that_the_planner_takes_are_not_in_whole_watts);
     RUN_TEST(test_of_two_lines_the_lower_one_counts);
     RUN_TEST(test_each_line_by_itself);
     RUN_TEST(test_a_line_may_begin_above_what_connector_and_vehicle_allow);

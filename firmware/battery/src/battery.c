@@ -1,6 +1,7 @@
 #include "taper/battery.h"
 
 #include "taper/battery_slope.h"
+#include "taper/real_math.h"
 
 static int64_t divide_up(int64_t numerator, int64_t denominator) {
     return (numerator + denominator - 1) / denominator;
@@ -8,16 +9,6 @@ static int64_t divide_up(int64_t numerator, int64_t denominator) {
 
 int32_t taper_battery_limit_W(const taper_demand_t *demand) {
     return taper_demand_battery_W(demand);
-}
-
-int32_t taper_battery_line_W(const taper_demand_t *demand, uint8_t line) {
-    const int32_t peak_W = line == 0 ? demand->peak_W : demand->second_peak_W;
-    if (line > 0 && peak_W <= 0) {
-        return TAPER_NO_LIMIT;
-    }
-    return demand->capacity_Wh <= 0
-               ? peak_W
-               : taper_demand_line_W(demand, peak_W, line == 0 ? demand->taper_W : demand->second_taper_W);
 }
 
 int32_t taper_battery_useful_W(const taper_demand_t *demand, uint32_t tick_ms) {
@@ -38,4 +29,13 @@ taper_real_t taper_battery_slope_per_h(const taper_demand_t *demand, uint8_t lin
     }
     const int32_t taper_W = line == 0 ? demand->taper_W : demand->second_taper_W;
     return (taper_real_t)taper_W / (taper_real_t)demand->capacity_Wh;
+}
+
+taper_real_t taper_battery_line_now_W(const taper_demand_t *demand, uint8_t line) {
+    const int32_t peak_W = line == 0 ? demand->peak_W : demand->second_peak_W;
+    if (line > 0 && peak_W <= 0) {
+        return TAPER_REAL_UNBOUNDED;
+    }
+    const taper_real_t fall_W = taper_battery_slope_per_h(demand, line) * (taper_real_t)demand->stored_Wh;
+    return taper_real_max((taper_real_t)peak_W - fall_W, 0);
 }

@@ -3,7 +3,6 @@
 #include <tgmath.h>
 
 #include "sums.h"
-#include "taper/battery.h"
 #include "taper/battery_slope.h"
 #include "taper/real_math.h"
 #include "worth.h"
@@ -58,13 +57,13 @@ static taper_real_t step_h(const taper_horizon_t *horizon) {
 
 /** Without such a line: one that limits nothing. */
 static line_t line_of(const taper_horizon_t *horizon, const taper_demand_t *demand, uint8_t line) {
-    const int32_t limit_W = taper_battery_line_W(demand, line);
-    if (limit_W == TAPER_NO_LIMIT) {
+    const taper_real_t limit_W = taper_battery_line_now_W(demand, line);
+    if (limit_W >= TAPER_REAL_UNBOUNDED) {
         return (line_t){.limit = TAPER_REAL_UNBOUNDED};
     }
     const taper_real_t slope = taper_battery_slope_per_h(demand, line) * step_h(horizon);
     return (line_t){
-        .limit = (taper_real_t)limit_W / horizon->base_W,
+        .limit = limit_W / horizon->base_W,
         .slope = slope < 1 ? slope
                            : 1, /* a battery that fills within one step: the taper row then bounds v(i,t) */
     };
@@ -73,7 +72,8 @@ static line_t line_of(const taper_horizon_t *horizon, const taper_demand_t *dema
 static chain_t chain_of(const taper_horizon_t *horizon, const taper_demand_t *demand) {
     chain_t chain = {
         .rate = (taper_real_t)taper_demand_allowed_W(demand) / horizon->base_W,
-        .taper = (taper_real_t)taper_battery_limit_W(demand) / horizon->base_W,
+        .taper = taper_real_min(taper_battery_line_now_W(demand, 0), taper_battery_line_now_W(demand, 1)) /
+                 horizon->base_W,
         .need = (taper_real_t)demand->need_Wh / (horizon->base_W * step_h(horizon)),
         .departs_in_s = demand->departs_in_s,
     };

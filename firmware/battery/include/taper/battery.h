@@ -19,9 +19,6 @@
 /** Most that the vehicle takes at its present SOC [W], >= 0, rounded up. Integer arithmetic. */
 int32_t taper_battery_limit_W(const taper_demand_t *demand);
 
-/** The same of line 0 or 1 alone; TAPER_NO_LIMIT where the vehicle has no such line. */
-int32_t taper_battery_line_W(const taper_demand_t *demand, uint8_t line);
-
 /**
  * Most that is of any use over the next `tick_ms` [W], >= 0: the least of what connector and vehicle allow, what the
  * battery takes, and what completes the need within the tick, rounded up. 0 for an inactive demand.
