@@ -157,7 +157,7 @@ def written(folder: Path, *lines: str) -> Path:
 
 
 def test_a_recorded_problem_is_read_back(tmp_path: Path) -> None:
-    one_phase = replace(EMPTY, conductors=1, max_mA=16_000)
+    one_phase = replace(EMPTY, conductors=1, max_mA=16_000, second_peak_W=90_000, second_taper_W=85_000)
     limit = "limit " + " ".join(["30000"] * HUB.steps)
     lines = ["station hub", "planning 1 2500 6 12", "time 7200000", limit, demand_line(HUB, 3, one_phase), "solve", "solve"]
     (found,) = read_problems(written(tmp_path, *lines))
@@ -166,7 +166,7 @@ def test_a_recorded_problem_is_read_back(tmp_path: Path) -> None:
     assert (found.time_ms, found.limit_W) == (7_200_000, [30_000] * HUB.steps)
 
 
-@pytest.mark.parametrize("line", ["demand 1 2", "planning x", "nonsense 1"])
+@pytest.mark.parametrize("line", ["demand 1 2", "second 1 90000 85000", "planning x", "nonsense 1"])
 def test_a_line_that_cannot_be_read_is_named(tmp_path: Path, line: str) -> None:
     with pytest.raises(InputError, match="problems, line 2: "):
         read_problems(written(tmp_path, "station hub", line))

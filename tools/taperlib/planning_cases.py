@@ -78,13 +78,16 @@ def read_problems(path: Path) -> list[Case]:
                 limit_W = list(map(int, fields))
             elif word == "demand":
                 demands.update([_demand(list(map(int, fields)))])
+            elif word == "second":
+                connector, peak_W, taper_W = map(int, fields)
+                demands[connector] = replace(demands[connector], second_peak_W=peak_W, second_taper_W=taper_W)
             elif word == "solve":
                 if demands:
                     cases.append(_case_of(recording, demands, limit_W))
                 demands = {}
             else:
                 _begin(recording, word, fields)
-        except (ValueError, IndexError, AttributeError) as error:
+        except (ValueError, LookupError, AttributeError) as error:
             raise InputError(f"{path}, line {number}: cannot be used: {error}") from None
     return cases
 

@@ -9,7 +9,8 @@
 #define TAPER_MAX_STEPS      4
 #define TAPER_MAX_GROUPS     12
 /** Rows of the planner, which is not built here. */
-#define TAPER_MAX_PLAN_ROWS 1
+#define TAPER_MAX_PLAN_ROWS   1
+#define TAPER_MAX_TAPER_LINES 1
 
 #define TAPER_REAL_IS_DOUBLE 1
 
