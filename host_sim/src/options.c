@@ -110,7 +110,7 @@ static const struct argp_option options[] = {
      "station's own, or 100)",
      0},
     {"outer-iterations", KEY_OUTER_ITERATIONS, "N", 0,
-     "The same: quadratic programmes per plan, 1..20 (default: the station's own, or 6)", 0},
+     "The same: quadratic programmes per plan, at most, 1..20 (default: the station's own, or 8)", 0},
     {"horizon-steps", KEY_HORIZON, "N", 0,
      "Steps that are planned, 2.. those of the station (default: the station's own, or all)", 0},
     {"replan", KEY_REPLAN, "WHEN", 0,

@@ -34,6 +34,21 @@ void taper_look(OSQPSolver *osqp, bool last) {
     }
 }
 
+/** Ten tolerances are what check_termination() calls inaccurate. */
+#define INACCURATE_FACTOR 10
+
+void taper_look_within(OSQPSolver *osqp, OSQPFloat primal, OSQPFloat dual, bool last) {
+    OSQPInfo *info = osqp->info;
+    update_status(info, OSQP_UNSOLVED);
+    update_info(osqp, 0, 0);
+    if (info->prim_res <= primal && info->dual_res <= dual) {
+        update_status(info, OSQP_SOLVED);
+    } else if (last && info->prim_res <= INACCURATE_FACTOR * primal &&
+               info->dual_res <= INACCURATE_FACTOR * dual) {
+        update_status(info, OSQP_SOLVED_INACCURATE);
+    }
+}
+
 OSQPFloat taper_balancing_penalty(const OSQPSolver *osqp) {
     return compute_rho_estimate(osqp);
 }

@@ -19,6 +19,9 @@ void taper_iterate(OSQPSolver *osqp, uint16_t count);
  */
 void taper_look(OSQPSolver *osqp, bool last);
 
+/** The same against tolerances of one's own, without the sizes of the problem. */
+void taper_look_within(OSQPSolver *osqp, OSQPFloat primal, OSQPFloat dual, bool last);
+
 /** The penalty that would balance the residuals of the last look. May be not finite. */
 OSQPFloat taper_balancing_penalty(const OSQPSolver *osqp);
 

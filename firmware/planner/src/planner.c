@@ -22,11 +22,11 @@ _Static_assert(sizeof(OSQPFloat) == sizeof(taper_real_t),
 #define ABSOLUTE_TOLERANCE ((OSQPFloat)(TAPER_REAL_IS_DOUBLE ? 1e-4 : 1e-3))
 #define RELATIVE_TOLERANCE ((OSQPFloat)(TAPER_REAL_IS_DOUBLE ? 3e-4 : 1e-3))
 /**
- * The same of the log utility. Its multipliers are a thousand times the gradients of the logarithm where the need of many
- * cannot be met: the relative one is small, and the first powers come within 0.4 % of the exact ones on such problems.
+ * The same of the log utility. Where the need of many cannot be met, lambda makes multipliers that are thousands of times the
+ * gradients of the logarithm, which decide about the powers: the dual residual may be this share of them.
  */
-#define LOG_ABSOLUTE_TOLERANCE ((OSQPFloat)(TAPER_REAL_IS_DOUBLE ? 5e-4 : 2e-3))
-#define LOG_RELATIVE_TOLERANCE ((OSQPFloat)(TAPER_REAL_IS_DOUBLE ? 5e-6 : 3e-5))
+#define LOG_TOLERANCE  ((OSQPFloat)(TAPER_REAL_IS_DOUBLE ? 5e-4 : 2e-3))
+#define STEEPEST_SHARE ((OSQPFloat)(TAPER_REAL_IS_DOUBLE ? 1e-6 : 3e-5))
 /**
  * Tolerance of OSQP's tests for infeasibility. Standing still is always feasible and power is bounded, so they can only
  * be wrong; and at the end of a slice their approximate form would throw the iterates away.
@@ -38,22 +38,16 @@ _Static_assert(sizeof(OSQPFloat) == sizeof(taper_real_t),
 #define LEAST_RHO ((OSQPFloat)0.3)
 /** The penalty is looked at again after every so many iterations, and changed if it is this factor off. */
 #define RHO_INTERVAL     50
-#define LOG_RHO_INTERVAL 20 /* of the log utility, whose multipliers are of very different sizes */
-/** Most iterations of a quadratic programme of the log utility that is not the last: there is no need for it to be exact. */
-#define OUTER_ITERATIONS 200
+#define LOG_RHO_INTERVAL 20
 #define RHO_TOLERANCE    ((OSQPFloat)2)
+/** Most iterations of a quadratic programme of the log utility: of the last one, and of those before, which need not be exact. */
+#define LOG_MOST_ITERATIONS   2000
+#define OUTER_MOST_ITERATIONS 200
 
 _Static_assert(RHO_INTERVAL % TAPER_MIN_SLICE == 0 && LOG_RHO_INTERVAL % TAPER_MIN_SLICE == 0,
                "the penalty is changed where the solver was looked at");
-_Static_assert(TAPER_MAX_ITERATIONS % RHO_INTERVAL == 0, "the budget is a number of intervals");
-
-static OSQPFloat relative_tolerance(const taper_planner_t *planner) {
-    return planner->horizon.log_utility ? LOG_RELATIVE_TOLERANCE : RELATIVE_TOLERANCE;
-}
-
-static OSQPFloat absolute_tolerance(const taper_planner_t *planner) {
-    return planner->horizon.log_utility ? LOG_ABSOLUTE_TOLERANCE : ABSOLUTE_TOLERANCE;
-}
+_Static_assert(TAPER_MAX_ITERATIONS % RHO_INTERVAL == 0 && LOG_MOST_ITERATIONS % TAPER_MIN_SLICE == 0,
+               "the budget is a number of intervals");
 
 static bool solver_fits(const taper_solver_t *solver, const taper_horizon_t *horizon) {
     const taper_station_config_t *config = horizon->config;
@@ -95,12 +89,6 @@ static void forget(taper_planner_t *planner) {
     osqp_cold_start(solver->osqp);
 }
 
-static void set_tolerance(const taper_planner_t *planner) {
-    OSQPSettings *settings = planner->solver->osqp->settings;
-    settings->eps_abs = absolute_tolerance(planner);
-    settings->eps_rel = relative_tolerance(planner);
-}
-
 taper_status_t taper_planner_init(taper_planner_t *planner, const taper_solver_t *solver,
                                   const taper_station_config_t *config) {
     memset(planner, 0, sizeof *planner);
@@ -114,7 +102,8 @@ taper_status_t taper_planner_init(taper_planner_t *planner, const taper_solver_t
     if (!write_matrices(planner) || !load_matrices(planner)) {
         return TAPER_ERR_CONFIG;
     }
-    set_tolerance(planner);
+    solver->osqp->settings->eps_abs = ABSOLUTE_TOLERANCE;
+    solver->osqp->settings->eps_rel = RELATIVE_TOLERANCE;
     solver->osqp->settings->eps_prim_inf = NEVER_INFEASIBLE;
     solver->osqp->settings->eps_dual_inf = NEVER_INFEASIBLE;
     forget(planner);
@@ -161,8 +150,14 @@ bool taper_planner_is_usable(taper_verdict_t verdict) {
 /** Whether the rows hold by our own account: the solver's says nothing if its memory is not what we gave it. */
 static bool rows_hold(const taper_planner_t *planner) {
     const taper_residual_t residual = taper_residual(&planner->horizon, planner->solver->osqp->solution->x);
-    const taper_real_t tolerance = absolute_tolerance(planner) + relative_tolerance(planner) * residual.size;
-    return residual.worst <= RESIDUAL_FACTOR * tolerance + absolute_tolerance(planner);
+    const bool is_log = planner->horizon.log_utility;
+    const taper_real_t absolute = is_log ? LOG_TOLERANCE : ABSOLUTE_TOLERANCE;
+    const taper_real_t tolerance = absolute + (is_log ? 0 : RELATIVE_TOLERANCE * residual.size);
+    return residual.worst <= RESIDUAL_FACTOR * tolerance + absolute;
+}
+
+static uint16_t most_iterations(const taper_planner_t *planner) {
+    return planner->horizon.log_utility ? LOG_MOST_ITERATIONS : TAPER_MAX_ITERATIONS;
 }
 
 /** Verdict on what the last look saw; the last of a problem decides. */
@@ -176,7 +171,7 @@ static taper_verdict_t judge(const taper_planner_t *planner) {
     case OSQP_SOLVED: return TAPER_VERDICT_SOLVED;
     case OSQP_SOLVED_INACCURATE: return TAPER_VERDICT_INACCURATE;
     case OSQP_UNSOLVED:
-        return planner->iterations < TAPER_MAX_ITERATIONS ? TAPER_VERDICT_SOLVING : TAPER_VERDICT_LATE;
+        return planner->iterations < most_iterations(planner) ? TAPER_VERDICT_SOLVING : TAPER_VERDICT_LATE;
     default: return TAPER_VERDICT_REFUSED; /* standing still is always feasible: a numerical fault */
     }
 }
@@ -202,7 +197,8 @@ static void go_on(taper_planner_t *planner) {
     const bool usable = taper_planner_is_usable(planner->verdict);
     const bool is_last =
         planner->outer + 1 >= outer_iterations(planner) || (usable && taper_utility_has_settled(planner));
-    const bool is_late = planner->verdict == TAPER_VERDICT_SOLVING && planner->iterations >= OUTER_ITERATIONS;
+    const bool is_late =
+        planner->verdict == TAPER_VERDICT_SOLVING && planner->iterations >= OUTER_MOST_ITERATIONS;
     if (planner->verdict == TAPER_VERDICT_LATE && planner->outer > 0) {
         planner->verdict = TAPER_VERDICT_INACCURATE;
     } else if (!is_last && (is_late || usable)) {
@@ -224,7 +220,12 @@ static uint16_t rho_interval(const taper_planner_t *planner) {
 /** See how far the solver is. */
 static void look(taper_planner_t *planner) {
     OSQPSolver *osqp = planner->solver->osqp;
-    taper_look(osqp, planner->iterations >= TAPER_MAX_ITERATIONS);
+    const bool last = planner->iterations >= most_iterations(planner);
+    if (planner->horizon.log_utility) {
+        taper_look_within(osqp, LOG_TOLERANCE, LOG_TOLERANCE + STEEPEST_SHARE * planner->steepest, last);
+    } else {
+        taper_look(osqp, last);
+    }
     planner->verdict = judge(planner);
     if (taper_planner_is_usable(planner->verdict)) {
         taper_store_iterates(osqp);

@@ -277,7 +277,9 @@ static void write_cost(taper_planner_t *planner, taper_writer_t *hessian, uint8_
     const bool wants = chain->need < TAPER_REAL_UNBOUNDED / 2;
     const taper_real_t unit = planner->horizon.unit[i];
     const taper_real_t scale = planner->cost_scale;
+    const taper_real_t charged = chain->energy[chain->steps - 1];
     const taper_real_t missing = wants ? 2 * scale * planner->horizon.missing_weight * unit * unit : 0;
+    planner->steepest = taper_real_max(planner->steepest, wants ? missing * (chain->need - charged) : 0);
     for (uint8_t t = 0; t < chain->steps; t++) {
         const bool last = t + 1 == chain->steps;
         const taper_real_t own = curvature(chain, point, scale, t);
@@ -296,6 +298,7 @@ taper_written_t taper_utility_expand(taper_planner_t *planner) {
     taper_writer_t hessian = {.values = solver->p_values, .room = solver->p_count};
     taper_real_t point[TAPER_MAX_STEPS];
     taper_project(&planner->horizon, solver->osqp->solution->x);
+    planner->steepest = 0;
     for (uint8_t i = 0; i < solver->connectors; i++) {
         const chain_t chain = chain_of(planner, i);
         bound_steps(&planner->horizon, i, &chain, point);

@@ -61,8 +61,10 @@ typedef struct {
     taper_real_t
         rate[TAPER_MAX_VARIABLES]; /**< log utility: rate limits, without those of the next step's length */
     taper_real_t need[TAPER_MAX_CONNECTORS]; /**< log utility: energy wanted, in the horizon's units */
-    taper_real_t cost_scale;                 /**< log utility: factor of the whole cost */
-    bool matrix_is_current; /**< the solver's factorisation is that of its matrices' values */
+    taper_real_t
+        steepest; /**< log utility: greatest worth of a unit of energy at the end, about which it was expanded */
+    taper_real_t cost_scale; /**< log utility: factor of the whole cost */
+    bool matrix_is_current;  /**< the solver's factorisation is that of its matrices' values */
 } taper_planner_t;
 
 /**
@@ -74,8 +76,8 @@ taper_status_t taper_planner_init(taper_planner_t *planner, const taper_solver_t
                                   const taper_station_config_t *config);
 
 /**
- * State a new problem. With the log utility it is a sequence of quadratic programmes, each around the answer of the last; their
- * number is fixed (taper_planning_t). If one after the first has no usable answer, the last one's is the plan, INACCURATE. The last usable answer, moved on in time, is the starting point; after a problem that was dropped
+ * State a new problem. With the log utility it is a sequence of quadratic programmes, each around the answer of the last, until
+ * nothing changes any more, and no more than taper_planning_t says. If one after the first has no usable answer, the last one's is the plan, INACCURATE. The last usable answer, moved on in time, is the starting point; after a problem that was dropped
  * or had no usable answer, the solver starts from nothing. The solver does not know of it before the next slice.
  * `course` as in taper_horizon_build(). Cost: that of taper_horizon_build(), and O(entries of the matrices).
  */

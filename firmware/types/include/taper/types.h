@@ -130,9 +130,9 @@ typedef enum {
     TAPER_OBJECTIVE_LOG_UTILITY = 1, /**< the paper's: proportional fairness (eq. 4 and 7) */
 } taper_objective_t;
 
-/** Most outer iterations of the log utility, and how many there are if a description does not say. */
+/** Most outer iterations of the log utility, and how many there are at most if a description does not say. */
 #define TAPER_MAX_OUTER_ITERATIONS     20
-#define TAPER_DEFAULT_OUTER_ITERATIONS 6
+#define TAPER_DEFAULT_OUTER_ITERATIONS 8
 
 /** How the planner plans. All 0: throughput over all steps, once a step and at every event. */
 typedef struct {
