@@ -62,6 +62,9 @@ static void watch_draw(taper_station_t *station, uint8_t i, uint32_t now_ms) {
         const int32_t cap_mA = draw->cap_mA - draw->cap_mA % TAPER_CURRENT_STEP_mA;
         demand->max_mA = taper_min_i32(demand->max_mA, taper_max_i32(cap_mA, demand->min_mA));
     }
+    if (station->options.config->planning.learns_taper) {
+        taper_learning_look(station, i, report.measured_mA);
+    }
 }
 
 static void take_snapshot(taper_station_t *station, uint32_t now_ms) {
@@ -104,6 +107,9 @@ static void propose(taper_station_t *station, taper_mode_t mode) {
                         &station->proposal);
     } else {
         taper_station_propose_plan(station);
+    }
+    if (station->options.config->planning.learns_taper) {
+        taper_learning_probe(station);
     }
 }
 

@@ -1,0 +1,158 @@
+/* The tapers that vehicles show by what they accept (taper/learn.h), and the offers that make them show it. */
+#include "taper/battery.h"
+
+#include "station_internal.h"
+
+/** A vehicle needs some time to rise to a higher offer, and to start: IEC 61851-1 knows no limit, most need less [ms]. */
+#define RISE_ms UINT32_C(30000)
+/** So much less than its offer is no noise of the measurement: 3 % and two steps. The margin of an offer is clear of that. */
+#define LESS_percent   3
+#define LESS_mA        200
+#define MARGIN_percent 5
+#define MARGIN_mA      400
+#define MOST_DOUBLINGS 6
+/** A line that is sure is tried again after this rest, each time for so long from when the vehicle has limited itself [ms]. */
+#define REST_ms UINT32_C(600000)
+#define SHOW_ms UINT32_C(30000)
+/** The planner is told of a line that has moved by this share of the vehicle's peak, at most so often. */
+#define MOVED_permille 50
+#define TELL_ms        UINT32_C(120000)
+/** A plan this close to the limit is for all that the vehicle takes [permille]. */
+#define ALL_permille 970
+
+static int32_t share(int32_t value, int32_t share, int32_t whole) {
+    return (int32_t)taper_quotient((int64_t)value * share, whole);
+}
+
+int32_t taper_learning_margin_mA(int32_t takes_mA) {
+    return MARGIN_mA + share(takes_mA, MARGIN_percent, 100);
+}
+
+static int32_t margin_W(const taper_learning_t *learning, const taper_demand_t *demand, int32_t limit_W) {
+    const int32_t takes_mA = taper_saturate_i32((int64_t)limit_W * 1000 / demand->W_per_A);
+    const int64_t margin_mA = (int64_t)taper_learning_margin_mA(takes_mA) << learning->doublings;
+    return taper_saturate_i32(margin_mA * demand->W_per_A / 1000);
+}
+
+/** Note what it is offered. A vehicle follows a lower offer at once, a higher one after a while. */
+static void follow_offer(const taper_station_t *station, uint8_t i, taper_learning_t *learning) {
+    const int32_t offered_mA = taper_max_i32(station->sent_mA[i], 0);
+    if (offered_mA > learning->offered_mA) {
+        learning->raised_ms = station->shape.changed_ms[i];
+    }
+    learning->offered_mA = offered_mA;
+    const bool has_risen = taper_elapsed_ms(station->snapshot.now_ms, learning->raised_ms) >= RISE_ms;
+    learning->settled_mA = has_risen ? offered_mA : taper_min_i32(learning->settled_mA, offered_mA);
+}
+
+/** Whether it took an offer that was above the line by half of the margin or more. */
+static bool took_more(const taper_learning_t *learning, const taper_demand_t *demand, int32_t limit_W) {
+    const int64_t offered_W = (int64_t)learning->settled_mA * demand->W_per_A / 1000;
+    return offered_W - limit_W > margin_W(learning, demand, limit_W) / 2;
+}
+
+static void note_show(const taper_station_t *station, taper_learning_t *learning, bool sure) {
+    const uint32_t now_ms = station->snapshot.now_ms;
+    if (!learning->shown) {
+        learning->shown = true;
+        learning->shown_ms = now_ms;
+    }
+    const uint32_t shows_ms = taper_elapsed_ms(now_ms, learning->shown_ms) + station->options.config->tick_ms;
+    learning->doublings = 0;
+    if (sure && !learning->rests && shows_ms >= SHOW_ms) {
+        learning->rests = true;
+        learning->rests_ms = now_ms;
+    }
+}
+
+/** What it draws, against its line. One that draws next to nothing pauses, and shows nothing. */
+static void take_sample(taper_station_t *station, taper_learning_t *learning, const taper_demand_t *demand,
+                        int32_t energy_Wh, int32_t measured_mA) {
+    if (measured_mA == TAPER_ABSENT || measured_mA <= TAPER_DRAW_FLOWS_mA) {
+        return;
+    }
+    const int32_t less_mA = LESS_mA + share(measured_mA, LESS_percent, 100);
+    const taper_learn_sample_t sample = {
+        .energy_Wh = energy_Wh,
+        /* EVSE_STATUS rounds up: the middle of its step. */
+        .power_W = share(measured_mA - TAPER_CURRENT_STEP_mA / 2, demand->W_per_A, 1000),
+        .step_W = share(TAPER_CURRENT_STEP_mA, demand->W_per_A, 1000),
+        .limits = measured_mA < learning->settled_mA - less_mA,
+    };
+    const int32_t limit_W = taper_learn_limit_W(&learning->line, energy_Wh);
+    taper_learn_take(&learning->line, &sample);
+    if (sample.limits) {
+        note_show(station, learning, taper_learn_is_sure(&learning->line, energy_Wh, demand->need_Wh));
+    } else if (took_more(learning, demand, limit_W)) {
+        learning->doublings = (uint8_t)taper_min_i32(learning->doublings + 1, MOST_DOUBLINGS);
+    }
+}
+
+static void tell_planner(taper_station_t *station, taper_learning_t *learning, const taper_demand_t *demand,
+                         int32_t energy_Wh) {
+    const uint32_t now_ms = station->snapshot.now_ms;
+    if (taper_elapsed_ms(now_ms, station->learned_ms) >= TELL_ms &&
+        taper_learn_moved(&learning->line, energy_Wh, demand->need_Wh, MOVED_permille)) {
+        station->learned_ms = now_ms;
+        station->sessions.revision++;
+    }
+}
+
+void taper_learning_look(taper_station_t *station, uint8_t i, int32_t measured_mA) {
+    taper_learning_t *learning = &station->learning[i];
+    taper_demand_t *demand = &station->snapshot.demand[i];
+    const int32_t energy_Wh = station->sessions.session[i].session_Wh;
+    if (!demand->active || energy_Wh == TAPER_ABSENT) {
+        return;
+    }
+    if (!learning->begun || learning->session != demand->session) {
+        *learning = (taper_learning_t){
+            .begun = true, .session = demand->session, .raised_ms = station->snapshot.now_ms};
+        taper_learn_begin(&learning->line, demand, energy_Wh);
+    }
+    follow_offer(station, i, learning);
+    take_sample(station, learning, demand, energy_Wh, measured_mA);
+    taper_learn_apply(&learning->line, energy_Wh, demand);
+    tell_planner(station, learning, demand, energy_Wh);
+}
+
+/** Whether it is time to offer more than the line: always, until that is sure, and then after every rest. */
+static bool is_due(const taper_station_t *station, taper_learning_t *learning, const taper_demand_t *demand,
+                   int32_t energy_Wh) {
+    const bool rested = taper_elapsed_ms(station->snapshot.now_ms, learning->rests_ms) >= REST_ms;
+    if (learning->rests && (rested || !taper_learn_is_sure(&learning->line, energy_Wh, demand->need_Wh))) {
+        learning->rests = false;
+        learning->shown = false;
+    }
+    return !learning->rests;
+}
+
+/**
+ * An offer that is just the line would never be refused, and so never show that the line is too low. Where the vehicle is to
+ * get all that it takes, it is offered a margin more. It is taken from nobody for long: what is left is noticed (draw.h).
+ */
+static void probe(taper_station_t *station, uint8_t i) {
+    taper_learning_t *learning = &station->learning[i];
+    const taper_demand_t *demand = &station->snapshot.demand[i];
+    taper_proposal_t *proposal = &station->proposal;
+    const int32_t limit_W = taper_battery_limit_W(demand);
+    const int32_t allowed_W = taper_demand_allowed_W(demand);
+    const int32_t energy_Wh = station->sessions.session[i].session_Wh;
+    if (limit_W >= allowed_W || proposal->ceiling_W[i] < limit_W ||
+        !is_due(station, learning, demand, energy_Wh)) {
+        return;
+    }
+    const int32_t more_W = taper_min_i32(margin_W(learning, demand, limit_W), allowed_W - limit_W);
+    if (proposal->wish_W[i] >= share(limit_W, ALL_permille, 1000)) {
+        proposal->wish_W[i] = limit_W + more_W;
+    }
+    proposal->ceiling_W[i] = limit_W + more_W;
+}
+
+void taper_learning_probe(taper_station_t *station) {
+    for (uint8_t i = 0; i < station->snapshot.count; i++) {
+        if (station->snapshot.demand[i].active && station->learning[i].begun) {
+            probe(station, i);
+        }
+    }
+}
