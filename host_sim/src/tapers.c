@@ -10,7 +10,7 @@ static const double shares[] = {0.1, 0.25, 0.5};
 void sim_tapers_init(sim_tapers_t *tapers, FILE *stream) {
     *tapers = (sim_tapers_t){.stream = stream};
     if (stream != NULL) {
-        fputs("session_id,share,learned,limit_kw,true_kw,limit_end_kw,true_end_kw,error\n", stream);
+        fputs("session_id,share,learned,sure,limit_kw,true_kw,limit_end_kw,true_end_kw,error\n", stream);
     }
 }
 
@@ -25,6 +25,11 @@ static double learned_kw(const taper_learn_t *line, double energy_kwh) {
     return taper_learn_limit_W(line, (int32_t)lround(energy_kwh * 1000.0)) / 1000.0;
 }
 
+static bool is_sure(const taper_learn_t *line, const sim_evse_t *evse) {
+    const double missing_Wh = sim_evse_missing_kwh(evse) * 1000.0;
+    return taper_learn_is_sure(line, (int32_t)lround(evse->energy_kwh * 1000.0), (int32_t)lround(missing_Wh));
+}
+
 static void put_row(FILE *stream, const sim_evse_t *evse, double share, const taper_learn_t *line) {
     const sim_session_t *vehicle = evse->vehicle;
     const double now_kwh = evse->energy_kwh;
@@ -33,9 +38,9 @@ static void put_row(FILE *stream, const sim_evse_t *evse, double share, const ta
     const double limit_end_kw = learned_kw(line, end_kwh);
     const double off_kw =
         fmax(fabs(limit_kw - true_kw(vehicle, now_kwh)), fabs(limit_end_kw - true_kw(vehicle, end_kwh)));
-    fprintf(stream, "%s,%.2f,%d,%.4f,%.4f,%.4f,%.4f,%.5f\n", vehicle->id, share,
-            taper_learn_knows(line) ? 1 : 0, limit_kw, true_kw(vehicle, now_kwh), limit_end_kw,
-            true_kw(vehicle, end_kwh), off_kw / vehicle->max_kw);
+    fprintf(stream, "%s,%.2f,%d,%d,%.4f,%.4f,%.4f,%.4f,%.5f\n", vehicle->id, share,
+            taper_learn_knows(line) ? 1 : 0, is_sure(line, evse) ? 1 : 0, limit_kw, true_kw(vehicle, now_kwh),
+            limit_end_kw, true_kw(vehicle, end_kwh), off_kw / vehicle->max_kw);
 }
 
 static void note(sim_tapers_t *tapers, unsigned i, const sim_evse_t *evse, const taper_learn_t *line) {

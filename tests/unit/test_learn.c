@@ -87,6 +87,7 @@ static void look(double offered_W) {
     const taper_learn_sample_t sample = {.energy_Wh = (int32_t)(trial.energy_Wh / 10.0) * 10,
                                          .power_W = measured_W(seen_W),
                                          .step_W = STEP_mA * VOLTS / 1000,
+                                         .offered_W = (int32_t)offered_W,
                                          .limits = draws_W < offered_W * 0.97 - 50.0 || outlier};
     taper_learn_take(&trial.learn, &sample);
     trial.energy_Wh += draws_W * scene->period_s / 3600.0;

@@ -5,32 +5,36 @@
 
 /** A vehicle needs some time to rise to a higher offer, and to start: IEC 61851-1 knows no limit, most need less [ms]. */
 #define RISE_ms UINT32_C(30000)
-/** So much less than its offer is no noise of the measurement: 3 % and two steps. The margin of an offer is clear of that. */
-#define LESS_percent   3
-#define LESS_mA        200
-#define MARGIN_percent 5
-#define MARGIN_mA      400
-#define MOST_DOUBLINGS 6
-/** A line that is sure is tried again after this rest, each time for so long from when the vehicle has limited itself [ms]. */
-#define REST_ms UINT32_C(600000)
-#define SHOW_ms UINT32_C(30000)
+/** So much less than its offer is no noise of the measurement: so many deviations of that, at least 1 % each, and two steps. The
+    margin of an offer is clear of that. */
+#define LESS_deviations   2
+#define LESS_mA           200
+#define MARGIN_deviations 3
+#define MARGIN_mA         300
+#define MOST_DOUBLINGS    6
+/** A vehicle is offered more for so long from when it has limited itself. Then what it could show waits for what others leave,
+    until it has rested, which a line that is sure does for longer [ms]. */
+#define SHOW_ms         UINT32_C(30000)
+#define REST_ms         UINT32_C(60000)
+#define REST_IF_SURE_ms UINT32_C(600000)
 /** The planner is told of a line that has moved by this share of the vehicle's peak, at most so often. */
 #define MOVED_permille 50
 #define TELL_ms        UINT32_C(120000)
 /** A plan this close to the limit is for all that the vehicle takes [permille]. */
 #define ALL_permille 970
 
-static int32_t share(int32_t value, int32_t share, int32_t whole) {
-    return (int32_t)taper_quotient((int64_t)value * share, whole);
+static int32_t part(int32_t value, int32_t thousandths) {
+    return (int32_t)taper_quotient((int64_t)value * thousandths, 1000);
 }
 
-int32_t taper_learning_margin_mA(int32_t takes_mA) {
-    return MARGIN_mA + share(takes_mA, MARGIN_percent, 100);
+int32_t taper_learning_margin_mA(const taper_learning_t *learning, int32_t takes_mA) {
+    const int32_t deviation = taper_learn_noise_permille(&learning->line);
+    return MARGIN_mA + part(takes_mA, MARGIN_deviations * deviation);
 }
 
 static int32_t margin_W(const taper_learning_t *learning, const taper_demand_t *demand, int32_t limit_W) {
     const int32_t takes_mA = taper_saturate_i32((int64_t)limit_W * 1000 / demand->W_per_A);
-    const int64_t margin_mA = (int64_t)taper_learning_margin_mA(takes_mA) << learning->doublings;
+    const int64_t margin_mA = (int64_t)taper_learning_margin_mA(learning, takes_mA) << learning->doublings;
     return taper_saturate_i32(margin_mA * demand->W_per_A / 1000);
 }
 
@@ -51,7 +55,7 @@ static bool took_more(const taper_learning_t *learning, const taper_demand_t *de
     return offered_W - limit_W > margin_W(learning, demand, limit_W) / 2;
 }
 
-static void note_show(const taper_station_t *station, taper_learning_t *learning, bool sure) {
+static void note_show(const taper_station_t *station, taper_learning_t *learning) {
     const uint32_t now_ms = station->snapshot.now_ms;
     if (!learning->shown) {
         learning->shown = true;
@@ -59,7 +63,7 @@ static void note_show(const taper_station_t *station, taper_learning_t *learning
     }
     const uint32_t shows_ms = taper_elapsed_ms(now_ms, learning->shown_ms) + station->options.config->tick_ms;
     learning->doublings = 0;
-    if (sure && !learning->rests && shows_ms >= SHOW_ms) {
+    if (!learning->rests && shows_ms >= SHOW_ms) {
         learning->rests = true;
         learning->rests_ms = now_ms;
     }
@@ -71,18 +75,21 @@ static void take_sample(taper_station_t *station, taper_learning_t *learning, co
     if (measured_mA == TAPER_ABSENT || measured_mA <= TAPER_DRAW_FLOWS_mA) {
         return;
     }
-    const int32_t less_mA = LESS_mA + share(measured_mA, LESS_percent, 100);
+    const int32_t deviation = taper_learn_noise_permille(&learning->line);
+    const int32_t less_mA = LESS_mA + part(measured_mA, LESS_deviations * deviation);
+    const bool settled = learning->settled_mA == learning->offered_mA;
     const taper_learn_sample_t sample = {
         .energy_Wh = energy_Wh,
         /* EVSE_STATUS rounds up: the middle of its step. */
-        .power_W = share(measured_mA - TAPER_CURRENT_STEP_mA / 2, demand->W_per_A, 1000),
-        .step_W = share(TAPER_CURRENT_STEP_mA, demand->W_per_A, 1000),
+        .power_W = part(measured_mA - TAPER_CURRENT_STEP_mA / 2, demand->W_per_A),
+        .step_W = part(TAPER_CURRENT_STEP_mA, demand->W_per_A),
+        .offered_W = settled ? part(learning->offered_mA, demand->W_per_A) : 0,
         .limits = measured_mA < learning->settled_mA - less_mA,
     };
     const int32_t limit_W = taper_learn_limit_W(&learning->line, energy_Wh);
     taper_learn_take(&learning->line, &sample);
     if (sample.limits) {
-        note_show(station, learning, taper_learn_is_sure(&learning->line, energy_Wh, demand->need_Wh));
+        note_show(station, learning);
     } else if (took_more(learning, demand, limit_W)) {
         learning->doublings = (uint8_t)taper_min_i32(learning->doublings + 1, MOST_DOUBLINGS);
     }
@@ -116,11 +123,10 @@ void taper_learning_look(taper_station_t *station, uint8_t i, int32_t measured_m
     tell_planner(station, learning, demand, energy_Wh);
 }
 
-/** Whether it is time to offer more than the line: always, until that is sure, and then after every rest. */
-static bool is_due(const taper_station_t *station, taper_learning_t *learning, const taper_demand_t *demand,
-                   int32_t energy_Wh) {
-    const bool rested = taper_elapsed_ms(station->snapshot.now_ms, learning->rests_ms) >= REST_ms;
-    if (learning->rests && (rested || !taper_learn_is_sure(&learning->line, energy_Wh, demand->need_Wh))) {
+/** Whether it is time to offer more than the line at the expense of others. */
+static bool is_due(const taper_station_t *station, taper_learning_t *learning, bool sure) {
+    const uint32_t rested_ms = taper_elapsed_ms(station->snapshot.now_ms, learning->rests_ms);
+    if (learning->rests && rested_ms >= (sure ? REST_IF_SURE_ms : REST_ms)) {
         learning->rests = false;
         learning->shown = false;
     }
@@ -128,8 +134,9 @@ static bool is_due(const taper_station_t *station, taper_learning_t *learning, c
 }
 
 /**
- * An offer that is just the line would never be refused, and so never show that the line is too low. Where the vehicle is to
- * get all that it takes, it is offered a margin more. It is taken from nobody for long: what is left is noticed (draw.h).
+ * An offer that is just the line would never be refused, and so never show that the line is too low. So where the vehicle is
+ * to get all that it takes, it is offered a margin more: of what others leave while its line is not sure, and now and then
+ * before others.
  */
 static void probe(taper_station_t *station, uint8_t i) {
     taper_learning_t *learning = &station->learning[i];
@@ -137,16 +144,19 @@ static void probe(taper_station_t *station, uint8_t i) {
     taper_proposal_t *proposal = &station->proposal;
     const int32_t limit_W = taper_battery_limit_W(demand);
     const int32_t allowed_W = taper_demand_allowed_W(demand);
-    const int32_t energy_Wh = station->sessions.session[i].session_Wh;
-    if (limit_W >= allowed_W || proposal->ceiling_W[i] < limit_W ||
-        !is_due(station, learning, demand, energy_Wh)) {
+    if (limit_W >= allowed_W || proposal->ceiling_W[i] < limit_W) {
         return;
     }
+    const int32_t energy_Wh = station->sessions.session[i].session_Wh;
+    const bool sure = taper_learn_is_sure(&learning->line, energy_Wh, demand->need_Wh);
+    const bool due = is_due(station, learning, sure);
     const int32_t more_W = taper_min_i32(margin_W(learning, demand, limit_W), allowed_W - limit_W);
-    if (proposal->wish_W[i] >= share(limit_W, ALL_permille, 1000)) {
+    if (due && proposal->wish_W[i] >= part(limit_W, ALL_permille)) {
         proposal->wish_W[i] = limit_W + more_W;
     }
-    proposal->ceiling_W[i] = limit_W + more_W;
+    if (due || !sure) {
+        proposal->ceiling_W[i] = limit_W + more_W;
+    }
 }
 
 void taper_learning_probe(taper_station_t *station) {

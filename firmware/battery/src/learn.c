@@ -7,10 +7,16 @@
 #include "taper/real_math.h"
 
 #define PER_KILO ((taper_real_t)0.001)
-#define NOISE    ((taper_real_t)0.01) /* of a power, as a share of it */
-/* Doubt in what was told: its level, and its fall over the charge, as shares of the peak. */
-#define LEVEL_DOUBT ((taper_real_t)0.30)
-#define FALL_DOUBT  ((taper_real_t)0.35)
+/* Deviation of a measurement, as a share of it, and what one look changes of that. Of normal noise the difference of two is
+   below 0.954 deviations in half of all cases. */
+#define LEAST_NOISE  ((taper_real_t)0.01)
+#define MOST_NOISE   ((taper_real_t)0.06)
+#define NOISE_MOVES  ((taper_real_t)1.05)
+#define NOISE_MEDIAN ((taper_real_t)0.954)
+#define NO_LOOK      ((taper_real_t)2)
+/* Doubt in what was told: its peak, at SOC 0, and its fall over the charge, as shares of the peak. */
+#define PEAK_DOUBT ((taper_real_t)0.20)
+#define FALL_DOUBT ((taper_real_t)0.35)
 /* The CUSUM: residuals are counted up to so many deviations, less the drift; beyond the last the line is wrong. */
 #define CLIP  ((taper_real_t)3)
 #define DRIFT ((taper_real_t)0.5)
@@ -26,8 +32,8 @@ static taper_real_t kilo(int32_t value) {
 }
 
 /* Deviation of a measurement of `power`, in steps of `step`. */
-static taper_real_t noise_of(taper_real_t power, taper_real_t step) {
-    return taper_real_max(power, LEAST_kW) * NOISE + step / 2;
+static taper_real_t noise_of(const taper_learn_t *learn, taper_real_t power, taper_real_t step) {
+    return taper_real_max(power, LEAST_kW) * learn->noise + step / 2;
 }
 
 static taper_real_t fall_of(const taper_learn_t *learn) {
@@ -65,11 +71,14 @@ static void hold_fall(taper_learn_t *learn, taper_real_t fall, taper_real_t spre
 }
 
 void taper_learn_begin(taper_learn_t *learn, const taper_demand_t *told, int32_t energy_Wh) {
-    *learn = (taper_learn_t){.centre = kilo(taper_max_i32(energy_Wh, 0))};
+    const int32_t stored_Wh = told->capacity_Wh > 0 ? told->stored_Wh : 0;
+    *learn = (taper_learn_t){.centre = kilo(taper_max_i32(energy_Wh, 0)) - kilo(stored_Wh),
+                             .noise = LEAST_NOISE,
+                             .strayed = NO_LOOK};
     learn->peak = taper_real_max(kilo(taper_min_i32(told->peak_W, taper_demand_allowed_W(told))), LEAST_kW);
-    learn->level = kilo(taper_battery_limit_W(told));
-    const taper_real_t deviation = noise_of(learn->peak, 0);
-    const taper_real_t level_share = deviation / (LEVEL_DOUBT * learn->peak);
+    learn->level = kilo(told->peak_W);
+    const taper_real_t deviation = noise_of(learn, learn->peak, 0);
+    const taper_real_t level_share = deviation / (PEAK_DOUBT * learn->peak);
     const taper_real_t fall_share = deviation / fall_doubt(learn, told);
     learn->weight = level_share * level_share;
     learn->least_spread = fall_share * fall_share;
@@ -141,13 +150,26 @@ static void lift(taper_learn_t *learn, taper_real_t energy, taper_real_t power, 
     }
 }
 
+/* The noise, by what changes between two looks in what is off: a wrong line is off by the same in both. */
+static void watch_noise(taper_learn_t *learn, taper_real_t energy, taper_real_t power, taper_real_t offered) {
+    const taper_real_t expected = taper_real_min(limit_at(learn, energy), offered);
+    const taper_real_t strays = expected > LEAST_kW ? power / expected - 1 : NO_LOOK;
+    if (fabs(strays) < 1 && fabs(learn->strayed) < 1) {
+        const bool more = fabs(strays - learn->strayed) > NOISE_MEDIAN * learn->noise;
+        const taper_real_t noise = more ? learn->noise * NOISE_MOVES : learn->noise / NOISE_MOVES;
+        learn->noise = taper_real_min(taper_real_max(noise, LEAST_NOISE), MOST_NOISE);
+    }
+    learn->strayed = strays;
+}
+
 void taper_learn_take(taper_learn_t *learn, const taper_learn_sample_t *sample) {
     if (!(learn->weight > 0) || sample->energy_Wh < 0 || sample->power_W < 0) {
         return;
     }
     const taper_real_t energy = kilo(sample->energy_Wh);
     const taper_real_t power = kilo(sample->power_W);
-    const taper_real_t noise = noise_of(power, kilo(taper_max_i32(sample->step_W, 0)));
+    watch_noise(learn, energy, power, kilo(sample->offered_W));
+    const taper_real_t noise = noise_of(learn, power, kilo(taper_max_i32(sample->step_W, 0)));
     const taper_real_t deviation = noise * sqrt(1 + doubt_at(learn, energy));
     const taper_real_t residual = (power - limit_at(learn, energy)) / deviation;
     if (sample->limits) {
@@ -164,6 +186,10 @@ int32_t taper_learn_limit_W(const taper_learn_t *learn, int32_t energy_Wh) {
     return taper_real_to_W(limit_at(learn, kilo(energy_Wh)) / PER_KILO, INT32_MAX);
 }
 
+int32_t taper_learn_noise_permille(const taper_learn_t *learn) {
+    return taper_real_to_W(learn->noise * 1000, 1000);
+}
+
 bool taper_learn_knows(const taper_learn_t *learn) {
     return learn->knows;
 }
@@ -174,7 +200,7 @@ bool taper_learn_is_sure(const taper_learn_t *learn, int32_t energy_Wh, int32_t 
     }
     const taper_real_t end = kilo(energy_Wh) + kilo(taper_max_i32(need_Wh, 0));
     const taper_real_t most = learn->peak * TAPER_LEARN_SURE_permille * PER_KILO;
-    const taper_real_t deviation = noise_of(learn->level, 0);
+    const taper_real_t deviation = noise_of(learn, learn->level, 0);
     return deviation * deviation * doubt_at(learn, end) < most * most;
 }
 

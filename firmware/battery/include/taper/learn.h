@@ -18,7 +18,8 @@
  *   of a battery that was flat so far. The line is then begun anew from the sample, with its fall as a weak guess.
  * - **Memory.** At most TAPER_LEARN_MOST samples weigh in full; beyond, the oldest fade.
  *
- * Assumed of a measurement: a deviation of 1 %, and half a step of its resolution.
+ * - **Noise.** The deviation of a measurement is taken from what changes from look to look, which no wrong line does: 1 to
+ *   6 % of it, and half a step of its resolution.
  */
 #ifndef TAPER_LEARN_H
 #define TAPER_LEARN_H
@@ -45,6 +46,8 @@ typedef struct {
     taper_real_t rises, falls;  /**< CUSUMs */
     taper_real_t peak;          /**< what shares are of */
     taper_real_t noted_limit, noted_fall; /**< at energy 0, when taper_learn_moved() was true last */
+    taper_real_t noise;                   /**< deviation of a measurement, as a share of it */
+    taper_real_t strayed;                 /**< by how much the last look was off, the same; beyond 1: none */
     bool noted;                           /**< it was, ever */
     bool knows;                           /**< a sample has moved it */
 } taper_learn_t;
@@ -54,6 +57,7 @@ typedef struct {
     int32_t energy_Wh; /**< charged since the session began */
     int32_t power_W;   /**< that it draws */
     int32_t step_W;    /**< resolution of that, >= 0 */
+    int32_t offered_W; /**< most that it may draw, for long enough; 0: that has changed just now */
     bool limits; /**< it could take more and does not: this is its limit. Else its limit is at least this */
 } taper_learn_sample_t;
 
@@ -65,6 +69,9 @@ void taper_learn_take(taper_learn_t *learn, const taper_learn_sample_t *sample);
 
 /** The limit at an energy [W], >= 0. */
 int32_t taper_learn_limit_W(const taper_learn_t *learn, int32_t energy_Wh);
+
+/** The deviation of a measurement [permille of it]. */
+int32_t taper_learn_noise_permille(const taper_learn_t *learn);
 
 /** Whether some sample was taken into account: before, taper_learn_apply() changes nothing. */
 bool taper_learn_knows(const taper_learn_t *learn);
