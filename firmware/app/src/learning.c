@@ -27,15 +27,23 @@ static int32_t part(int32_t value, int32_t thousandths) {
     return (int32_t)taper_quotient((int64_t)value * thousandths, 1000);
 }
 
-int32_t taper_learning_margin_mA(const taper_learning_t *learning, int32_t takes_mA) {
+static int32_t margin_mA(const taper_learning_t *learning, int32_t takes_mA) {
     const int32_t deviation = taper_learn_noise_permille(&learning->line);
     return MARGIN_mA + part(takes_mA, MARGIN_deviations * deviation);
 }
 
 static int32_t margin_W(const taper_learning_t *learning, const taper_demand_t *demand, int32_t limit_W) {
     const int32_t takes_mA = taper_saturate_i32((int64_t)limit_W * 1000 / demand->W_per_A);
-    const int64_t margin_mA = (int64_t)taper_learning_margin_mA(learning, takes_mA) << learning->doublings;
-    return taper_saturate_i32(margin_mA * demand->W_per_A / 1000);
+    const int64_t more_mA = (int64_t)margin_mA(learning, takes_mA) << learning->doublings;
+    return taper_saturate_i32(more_mA * demand->W_per_A / 1000);
+}
+
+int32_t taper_learning_cap_mA(const taper_station_t *station, uint8_t i, int32_t cap_mA) {
+    const taper_learning_t *learning = &station->learning[i];
+    if (!learning->begun || cap_mA == TAPER_NO_LIMIT) {
+        return cap_mA;
+    }
+    return cap_mA + taper_max_i32(margin_mA(learning, cap_mA) - TAPER_DRAW_UNUSED_mA, 0);
 }
 
 /** Note what it is offered. A vehicle follows a lower offer at once, a higher one after a while. */
@@ -98,8 +106,8 @@ static void take_sample(taper_station_t *station, taper_learning_t *learning, co
 static void tell_planner(taper_station_t *station, taper_learning_t *learning, const taper_demand_t *demand,
                          int32_t energy_Wh) {
     const uint32_t now_ms = station->snapshot.now_ms;
-    if (taper_elapsed_ms(now_ms, station->learned_ms) >= TELL_ms &&
-        taper_learn_moved(&learning->line, energy_Wh, demand->need_Wh, MOVED_permille)) {
+    const bool may = station->learned_ms == 0 || taper_elapsed_ms(now_ms, station->learned_ms) >= TELL_ms;
+    if (may && taper_learn_moved(&learning->line, energy_Wh, demand->need_Wh, MOVED_permille)) {
         station->learned_ms = now_ms;
         station->sessions.revision++;
     }

@@ -42,8 +42,8 @@ bool taper_node_guard_passes(taper_station_t *station, taper_node_guard_t *guard
 /** A look at the vehicle of connector `i`, which draws `measured_mA` or absent: its demand gets the line that is known. */
 void taper_learning_look(taper_station_t *station, uint8_t i, int32_t measured_mA);
 
-/** Current that is offered above what a vehicle takes, so that it shows whether it could take more. */
-int32_t taper_learning_margin_mA(const taper_learning_t *learning, int32_t takes_mA);
+/** The cap of a vehicle that leaves current unused (draw.h), raised where it leaves less than what shows a limit. */
+int32_t taper_learning_cap_mA(const taper_station_t *station, uint8_t i, int32_t cap_mA);
 
 /** Offer some vehicles more than their lines say, where they are to get all of that. */
 void taper_learning_probe(taper_station_t *station);
