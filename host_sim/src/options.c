@@ -283,7 +283,7 @@ static void check_bus(const sim_options_t *chosen, struct argp_state *state) {
     }
     if (chosen->learns || chosen->tapers_file != NULL) {
         argp_error(state,
-                   "--learn-taper, --tapers: whether a board (--bus) learns is in its own description");
+                   "--learn-taper and --tapers: whether a board (--bus) learns is in its own description");
     }
     if (taper_setup_buses(station) > 1) {
         argp_error(state, "--bus: station %s has %u CAN buses, and SLCAN carries one", station->name,

@@ -201,7 +201,7 @@ typedef struct {
     int32_t capacity_Wh;     /**< > 0, or 0: unknown (no taper then) */
     int32_t need_Wh;         /**< energy still wanted, > 0 */
     int32_t peak_W;          /**< what the vehicle takes at SOC 0, >= 0 */
-    int32_t taper_W;         /**< fall of that from SOC 0 to SOC 1, 0..peak_W */
+    int32_t taper_W;         /**< fall of that from SOC 0 to SOC 1, 0..peak_W; a learned one may reach 0 earlier */
     int32_t max_mA;          /**< least of connector and vehicle limit, per phase */
     int32_t min_mA;          /**< greatest of connector and vehicle minimum */
     int32_t W_per_A;         /**< power of 1 A on each phase in use, > 0 */
