@@ -46,14 +46,15 @@ int32_t taper_learning_cap_mA(const taper_station_t *station, uint8_t i, int32_t
     return cap_mA + taper_max_i32(margin_mA(learning, cap_mA) - TAPER_DRAW_UNUSED_mA, 0);
 }
 
-/** Note what it is offered. A vehicle follows a lower offer at once, a higher one after a while. */
+/** Note what it is offered. A vehicle follows a lower offer at once, and one that is a little higher; others after a while. */
 static void follow_offer(const taper_station_t *station, uint8_t i, taper_learning_t *learning) {
     const int32_t offered_mA = taper_max_i32(station->sent_mA[i], 0);
-    if (offered_mA > learning->offered_mA) {
+    if (offered_mA > learning->offered_mA && offered_mA > learning->settled_mA + LESS_mA) {
         learning->raised_ms = station->shape.changed_ms[i];
     }
     learning->offered_mA = offered_mA;
-    const bool has_risen = taper_elapsed_ms(station->snapshot.now_ms, learning->raised_ms) >= RISE_ms;
+    const bool has_risen = offered_mA <= learning->settled_mA + LESS_mA ||
+                           taper_elapsed_ms(station->snapshot.now_ms, learning->raised_ms) >= RISE_ms;
     learning->settled_mA = has_risen ? offered_mA : taper_min_i32(learning->settled_mA, offered_mA);
 }
 

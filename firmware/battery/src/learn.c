@@ -22,8 +22,10 @@
 #define DRIFT ((taper_real_t)0.5)
 #define WRONG ((taper_real_t)12)
 /* A vehicle that takes all it may, so many deviations above the line, lifts it; and so far above, at once. */
-#define LIFTS     ((taper_real_t)1)
-#define LEAPS     ((taper_real_t)4)
+#define LIFTS ((taper_real_t)3)
+#define LEAPS ((taper_real_t)4)
+/* An offer so far above the line is refused, if the line is right. */
+#define CLEAR     ((taper_real_t)2)
 #define LEAST_kW  ((taper_real_t)0.01)
 #define LEAST_kWh ((taper_real_t)0.1)
 
@@ -137,19 +139,6 @@ static void fit(taper_learn_t *learn, taper_real_t energy, taper_real_t power, t
     }
 }
 
-/* The limit is at least this: a line below it is lifted. */
-static void lift(taper_learn_t *learn, taper_real_t energy, taper_real_t power, taper_real_t noise,
-                 taper_real_t residual) {
-    if (residual < LIFTS) {
-        learn->rises = taper_real_max(learn->rises - DRIFT, 0);
-        return;
-    }
-    fit(learn, energy, power, residual);
-    if (limit_at(learn, energy) < power - LEAPS * noise) {
-        begin_anew(learn, energy, power);
-    }
-}
-
 /* The noise, by what changes between two looks in what is off: a wrong line is off by the same in both. */
 static void watch_noise(taper_learn_t *learn, taper_real_t energy, taper_real_t power, taper_real_t offered) {
     const taper_real_t expected = taper_real_min(limit_at(learn, energy), offered);
@@ -162,20 +151,34 @@ static void watch_noise(taper_learn_t *learn, taper_real_t energy, taper_real_t 
     learn->strayed = strays;
 }
 
+/* A vehicle that takes all: its limit is at least this. */
+static void lift(taper_learn_t *learn, taper_real_t energy, taper_real_t power, taper_real_t noise) {
+    if (limit_at(learn, energy) < power - LEAPS * noise) {
+        learn->knows = true;
+        begin_anew(learn, energy, power);
+    }
+}
+
+/*
+ * All that is drawn of an offer clear of the line counts as a sample: to leave out what noise raises would pull the line down,
+ * and most where it is poor; its slope would follow.
+ */
 void taper_learn_take(taper_learn_t *learn, const taper_learn_sample_t *sample) {
     if (!(learn->weight > 0) || sample->energy_Wh < 0 || sample->power_W < 0) {
         return;
     }
     const taper_real_t energy = kilo(sample->energy_Wh);
     const taper_real_t power = kilo(sample->power_W);
-    watch_noise(learn, energy, power, kilo(sample->offered_W));
+    const taper_real_t offered = kilo(sample->offered_W);
+    watch_noise(learn, energy, power, offered);
     const taper_real_t noise = noise_of(learn, power, kilo(taper_max_i32(sample->step_W, 0)));
-    const taper_real_t deviation = noise * sqrt(1 + doubt_at(learn, energy));
-    const taper_real_t residual = (power - limit_at(learn, energy)) / deviation;
-    if (sample->limits) {
+    const taper_real_t limit = limit_at(learn, energy);
+    const taper_real_t residual = (power - limit) / (noise * sqrt(1 + doubt_at(learn, energy)));
+    if (sample->limits || offered > limit + CLEAR * noise || residual >= LIFTS) {
         fit(learn, energy, power, residual);
-    } else {
-        lift(learn, energy, power, noise, residual);
+    }
+    if (!sample->limits) {
+        lift(learn, energy, power, noise);
     }
 }
 
