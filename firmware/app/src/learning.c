@@ -40,22 +40,22 @@ static int32_t margin_W(const taper_learning_t *learning, const taper_demand_t *
 
 int32_t taper_learning_cap_mA(const taper_station_t *station, uint8_t i, int32_t cap_mA) {
     const taper_learning_t *learning = &station->learning[i];
-    if (!learning->begun || cap_mA == TAPER_NO_LIMIT) {
+    if (learning->session == 0 || cap_mA == TAPER_NO_LIMIT) {
         return cap_mA;
     }
     return cap_mA + taper_max_i32(margin_mA(learning, cap_mA) - TAPER_DRAW_UNUSED_mA, 0);
 }
 
-/** Note what it is offered. A vehicle follows a lower offer at once, and one that is a little higher; others after a while. */
-static void follow_offer(const taper_station_t *station, uint8_t i, taper_learning_t *learning) {
+/**
+ * Note what it is offered. A vehicle follows a lower offer at once, and one that is a little higher; others after a while.
+ * @return whether it has.
+ */
+static bool follow_offer(const taper_station_t *station, uint8_t i, taper_learning_t *learning) {
     const int32_t offered_mA = taper_max_i32(station->sent_mA[i], 0);
-    if (offered_mA > learning->offered_mA && offered_mA > learning->settled_mA + LESS_mA) {
-        learning->raised_ms = station->shape.changed_ms[i];
-    }
-    learning->offered_mA = offered_mA;
-    const bool has_risen = offered_mA <= learning->settled_mA + LESS_mA ||
-                           taper_elapsed_ms(station->snapshot.now_ms, learning->raised_ms) >= RISE_ms;
+    const uint32_t still_ms = taper_elapsed_ms(station->snapshot.now_ms, station->shape.changed_ms[i]);
+    const bool has_risen = offered_mA <= learning->settled_mA + LESS_mA || still_ms >= RISE_ms;
     learning->settled_mA = has_risen ? offered_mA : taper_min_i32(learning->settled_mA, offered_mA);
+    return has_risen;
 }
 
 /** Whether it took an offer that was above the line by half of the margin or more. */
@@ -64,35 +64,38 @@ static bool took_more(const taper_learning_t *learning, const taper_demand_t *de
     return offered_W - limit_W > margin_W(learning, demand, limit_W) / 2;
 }
 
+/** It has limited itself: after a while of that it rests. */
 static void note_show(const taper_station_t *station, taper_learning_t *learning) {
     const uint32_t now_ms = station->snapshot.now_ms;
+    learning->doublings = 0;
+    if (learning->rests) {
+        return;
+    }
     if (!learning->shown) {
         learning->shown = true;
-        learning->shown_ms = now_ms;
+        learning->since_ms = now_ms;
     }
-    const uint32_t shows_ms = taper_elapsed_ms(now_ms, learning->shown_ms) + station->options.config->tick_ms;
-    learning->doublings = 0;
-    if (!learning->rests && shows_ms >= SHOW_ms) {
+    const uint32_t shows_ms = taper_elapsed_ms(now_ms, learning->since_ms) + station->options.config->tick_ms;
+    if (shows_ms >= SHOW_ms) {
         learning->rests = true;
-        learning->rests_ms = now_ms;
+        learning->since_ms = now_ms;
     }
 }
 
 /** What it draws, against its line. One that draws next to nothing pauses, and shows nothing. */
 static void take_sample(taper_station_t *station, taper_learning_t *learning, const taper_demand_t *demand,
-                        int32_t energy_Wh, int32_t measured_mA) {
+                        int32_t energy_Wh, int32_t measured_mA, bool has_risen) {
     if (measured_mA == TAPER_ABSENT || measured_mA <= TAPER_DRAW_FLOWS_mA) {
         return;
     }
     const int32_t deviation = taper_learn_noise_permille(&learning->line);
     const int32_t less_mA = LESS_mA + part(measured_mA, LESS_deviations * deviation);
-    const bool settled = learning->settled_mA == learning->offered_mA;
     const taper_learn_sample_t sample = {
         .energy_Wh = energy_Wh,
         /* EVSE_STATUS rounds up: the middle of its step. */
         .power_W = part(measured_mA - TAPER_CURRENT_STEP_mA / 2, demand->W_per_A),
         .step_W = part(TAPER_CURRENT_STEP_mA, demand->W_per_A),
-        .offered_W = settled ? part(learning->offered_mA, demand->W_per_A) : 0,
+        .offered_W = has_risen ? part(learning->settled_mA, demand->W_per_A) : 0,
         .limits = measured_mA < learning->settled_mA - less_mA,
     };
     const int32_t limit_W = taper_learn_limit_W(&learning->line, energy_Wh);
@@ -121,20 +124,19 @@ void taper_learning_look(taper_station_t *station, uint8_t i, int32_t measured_m
     if (!demand->active || energy_Wh == TAPER_ABSENT) {
         return;
     }
-    if (!learning->begun || learning->session != demand->session) {
-        *learning = (taper_learning_t){
-            .begun = true, .session = demand->session, .raised_ms = station->snapshot.now_ms};
+    if (learning->session != demand->session) {
+        *learning = (taper_learning_t){.session = demand->session};
         taper_learn_begin(&learning->line, demand, energy_Wh);
     }
-    follow_offer(station, i, learning);
-    take_sample(station, learning, demand, energy_Wh, measured_mA);
+    const bool has_risen = follow_offer(station, i, learning);
+    take_sample(station, learning, demand, energy_Wh, measured_mA, has_risen);
     taper_learn_apply(&learning->line, energy_Wh, demand);
     tell_planner(station, learning, demand, energy_Wh);
 }
 
 /** Whether it is time to offer more than the line at the expense of others. */
 static bool is_due(const taper_station_t *station, taper_learning_t *learning, bool sure) {
-    const uint32_t rested_ms = taper_elapsed_ms(station->snapshot.now_ms, learning->rests_ms);
+    const uint32_t rested_ms = taper_elapsed_ms(station->snapshot.now_ms, learning->since_ms);
     if (learning->rests && rested_ms >= (sure ? REST_IF_SURE_ms : REST_ms)) {
         learning->rests = false;
         learning->shown = false;
@@ -170,7 +172,8 @@ static void probe(taper_station_t *station, uint8_t i) {
 
 void taper_learning_probe(taper_station_t *station) {
     for (uint8_t i = 0; i < station->snapshot.count; i++) {
-        if (station->snapshot.demand[i].active && station->learning[i].begun) {
+        if (station->snapshot.demand[i].active &&
+            station->learning[i].session == station->snapshot.demand[i].session) {
             probe(station, i);
         }
     }

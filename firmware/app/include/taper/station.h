@@ -145,17 +145,15 @@ typedef struct {
     int32_t need_Wh;    /**< what it wanted then */
 } taper_prospect_t;
 
-/** The taper that is being learned from one vehicle (learning.c). A restart begins it anew. Times are the world's. */
+/** The taper that is being learned from one vehicle (learning.c). A restart begins it anew. */
 typedef struct {
     taper_learn_t line;
-    bool begun;
-    uint8_t session;    /**< whose it is */
+    uint8_t session;    /**< whose it is; 0: nobody's yet */
     uint8_t doublings;  /**< of the margin: offers above the line were taken whole so many times in a row */
-    bool shown;         /**< it has limited itself since it is offered more, first at `shown_ms` */
-    bool rests;         /**< since `rests_ms` it is offered no more than the line */
-    int32_t offered_mA; /**< by the last look */
-    int32_t settled_mA; /**< of that, what it had time to rise to */
-    uint32_t raised_ms, shown_ms, rests_ms;
+    bool shown;         /**< it has limited itself since it is offered more */
+    bool rests;         /**< it is offered no more than the line */
+    int32_t settled_mA; /**< of what it is offered, what it had time to rise to */
+    uint32_t since_ms;  /**< `rests`, or else `shown` holds, in the world's time */
 } taper_learning_t;
 
 /** What is in the port's store to survive a restart (record.c), written whole, two copies in turn. */
@@ -183,7 +181,7 @@ typedef struct {
     taper_draw_t draw[TAPER_MAX_CONNECTORS];
     taper_conductors_t conductors[TAPER_MAX_CONNECTORS];
     taper_learning_t learning[TAPER_MAX_CONNECTORS]; /**< where the configuration says that tapers are learned */
-    uint32_t learned_ms; /**< when the planner was last told that a line has moved */
+    uint32_t learned_ms; /**< when the planner was last told that a line has moved; 0: never */
     taper_health_t health; /**< of the planner */
     taper_self_t self;     /**< of this controller */
     taper_stranger_t stranger[TAPER_STRANGERS];
