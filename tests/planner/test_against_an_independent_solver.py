@@ -11,11 +11,13 @@ import os
 import random
 import subprocess
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
-from oracle import STATIONS as DESCRIPTIONS
-from oracle import SPECIAL_STATIONS, Demand, Problem, Station, read_station
+from taperlib.planner_probe import demand_line
+from taperlib.planning_problem import STATIONS as DESCRIPTIONS
+from taperlib.planning_problem import Demand, Problem, Station, read_station
 
 SOLVED, INACCURATE = 2, 3  # taper_verdict_t
 DOUBLE = os.environ["TAPER_REAL"] == "double"
@@ -26,16 +28,7 @@ BINDS = 2e-3  # what a limit that matters costs at least, whatever the planner's
 late: list[str] = []
 STATIONS = ["hub", "garage", "paper", "depot", "caltech"]
 SPECIAL = ["mixed"]
-
-
-def demand_line(station: Station, i: int, d: Demand) -> str:
-    connector = station.connector[i]
-    W_per_A = connector.volts * d.conductors if d.conductors else connector.W_per_A
-    phases = sum(1 << line for line in connector.lines[: d.conductors]) if d.conductors else ""
-    return (
-        f"demand {i} 1 {d.stored_Wh} {d.capacity_Wh} {d.need_Wh} {d.peak_W} {d.taper_W} "
-        f"{connector.max_mA} {W_per_A:g} {d.departs_in_s} {phases}"
-    )
+SPECIAL_STATIONS = Path(__file__).resolve().parent / "stations"
 
 
 def probe(

@@ -29,10 +29,20 @@ static void test_the_limit_is_never_negative(void) {
     TEST_ASSERT_EQUAL_INT32(0, taper_battery_limit_W(&demand));
 }
 
+static void test_the_limit_that_the_planner_takes_is_not_in_whole_watts(void) {
+    taper_demand_t demand = tapered(59996);
+    TEST_ASSERT_EQUAL_INT32(1361, taper_battery_limit_W(&demand));
+    TEST_ASSERT_FLOAT_WITHIN(0.01F, 1360.4F, (float)taper_battery_limit_now_W(&demand));
+    demand.taper_W = 7360;
+    demand.stored_Wh = 90000;
+    TEST_ASSERT_TRUE(taper_battery_limit_now_W(&demand) == 0);
+}
+
 static void test_an_unknown_capacity_means_no_taper(void) {
     taper_demand_t demand = tapered(30000);
     demand.capacity_Wh = 0;
     TEST_ASSERT_EQUAL_INT32(7360, taper_battery_limit_W(&demand));
+    TEST_ASSERT_TRUE(taper_battery_limit_now_W(&demand) == 7360);
     TEST_ASSERT_TRUE(taper_battery_slope_per_h(&demand) == 0);
 }
 
@@ -88,6 +98,7 @@ int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_the_limit_falls_on_a_line_from_the_peak);
     RUN_TEST(test_the_limit_is_never_negative);
+    RUN_TEST(test_the_limit_that_the_planner_takes_is_not_in_whole_watts);
     RUN_TEST(test_an_unknown_capacity_means_no_taper);
     RUN_TEST(test_useful_power_is_bounded_by_connector_taper_and_need);
     RUN_TEST(test_nothing_is_useful_for_an_inactive_demand);

@@ -18,8 +18,8 @@ class SiteLimit:
     simulator_arguments: tuple[str, ...]
 
 
-def add_limit_arguments(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_mutually_exclusive_group(required=True)
+def add_limit_arguments(parser: argparse.ArgumentParser, required: bool = True) -> None:
+    group = parser.add_mutually_exclusive_group(required=required)
     group.add_argument("--limit-kw", type=not_negative, help="site limit [kW]")
     group.add_argument("--limit-share", type=positive,
                        help=f"site limit as a share of {KW_PER_CAR} kW for every car at the busiest moment")

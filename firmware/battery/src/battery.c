@@ -1,6 +1,7 @@
 #include "taper/battery.h"
 
 #include "taper/battery_slope.h"
+#include "taper/real_math.h"
 
 static int64_t divide_up(int64_t numerator, int64_t denominator) {
     return (numerator + denominator - 1) / denominator;
@@ -31,4 +32,9 @@ taper_real_t taper_battery_slope_per_h(const taper_demand_t *demand) {
         return 0;
     }
     return (taper_real_t)demand->taper_W / (taper_real_t)demand->capacity_Wh;
+}
+
+taper_real_t taper_battery_limit_now_W(const taper_demand_t *demand) {
+    const taper_real_t fall_W = taper_battery_slope_per_h(demand) * (taper_real_t)demand->stored_Wh;
+    return taper_real_max((taper_real_t)demand->peak_W - fall_W, 0);
 }

@@ -17,7 +17,6 @@ import numpy as np
 import scipy.sparse as sp
 
 STATIONS = Path(__file__).resolve().parents[2] / "codegen" / "stations"
-SPECIAL_STATIONS = Path(__file__).resolve().parent / "stations"
 DISCOUNT = 0.95
 CURVATURE = 0.1
 LESSER_PAIR = 0.733  # sqrt(3) - 1, as the firmware's rows have it: rounded up to a permille
@@ -35,6 +34,7 @@ class Demand:
     taper_W: int
     departs_in_s: int
     conductors: int | None = None  # in use, of a socket that has more
+    max_mA: int | None = None  # what vehicle and connector allow; None: the connector's
 
 
 @dataclass(frozen=True)
@@ -167,7 +167,9 @@ class Problem:
         self._draws = [Draw.of(station.connector[i], demands[i].conductors, station.volts) for i in self.connectors]
         self._power_share = np.array(limit_W) / max(*limit_W, 1)
         for chain, connector in enumerate(self.connectors):
-            allowed_W = station.connector[connector].max_mA * self._draws[chain].W_per_A / 1000
+            max_mA = demands[connector].max_mA
+            allowed_mA = station.connector[connector].max_mA if max_mA is None else max_mA
+            allowed_W = allowed_mA * self._draws[chain].W_per_A / 1000
             self._add_vehicle(chain, demands[connector], allowed_W)
         for number, group in enumerate(station.groups):
             self._add_power(group, limit_W if number == 0 else None)
