@@ -180,10 +180,11 @@ typedef struct {
     taper_shape_t shape;
     taper_draw_t draw[TAPER_MAX_CONNECTORS];
     taper_conductors_t conductors[TAPER_MAX_CONNECTORS];
-    taper_learning_t learning[TAPER_MAX_CONNECTORS]; /**< where the configuration says that tapers are learned */
-    uint32_t learned_ms; /**< when the planner was last told that a line has moved; 0: never */
-    taper_health_t health; /**< of the planner */
-    taper_self_t self;     /**< of this controller */
+    taper_learning_t
+        learning[TAPER_MAX_CONNECTORS]; /**< where the configuration says that tapers are learned */
+    uint32_t learned_ms;                /**< when the planner was last told that a line has moved; 0: never */
+    taper_health_t health;              /**< of the planner */
+    taper_self_t self;                  /**< of this controller */
     taper_stranger_t stranger[TAPER_STRANGERS];
     taper_transfers_t transfers;
     union {
@@ -222,8 +223,8 @@ typedef struct {
     uint32_t second_ms; /**< when PLAN and CTRL_DIAG last went out */
     uint8_t next_plan, next_diag;
     int32_t plan_W[TAPER_MAX_STEPS][TAPER_MAX_CONNECTORS]; /**< the last finished plan */
-    uint8_t plan_session[TAPER_MAX_CONNECTORS];             /**< whom it was made for */
-    bool plan_waits[TAPER_MAX_CONNECTORS];                  /**< he waits for a lower price */
+    uint8_t plan_session[TAPER_MAX_CONNECTORS];            /**< whom it was made for */
+    bool plan_waits[TAPER_MAX_CONNECTORS];                 /**< he waits for a lower price */
     uint32_t plan_made_ms;
     bool plan_usable;
     int32_t planned_limit_W; /**< site limit and table revision of the last problem */
