@@ -70,16 +70,20 @@ static void propose_equal_share(void *tick_ms, const taper_snapshot_t *snapshot,
 #define LOG_UTILITY TAPER_OBJECTIVE_LOG_UTILITY
 
 const sim_policy_t sim_policies[] = {
-    {"soc-mpc", "planner that knows the taper", true, NULL, THROUGHPUT, TAPER_DRIVE_PLANNER},
-    {"mpc", "the same planner, without the taper", false, NULL, THROUGHPUT, TAPER_DRIVE_PLANNER},
-    {"soc-mpc-log", "planner of the paper, by log utility (eq. 7)", true, NULL, LOG_UTILITY, -1},
-    {"mpc-log", "the same, without the taper (eq. 4)", false, NULL, LOG_UTILITY, -1},
-    {"edf", "earliest deadline first, without the taper", false, propose_edf, THROUGHPUT, TAPER_DRIVE_EDF},
-    {"edf-soc", "earliest deadline first, clamped to the taper", true, propose_edf, THROUGHPUT,
+    {"soc-mpc", "planner that knows the taper", true, NULL, THROUGHPUT, false, TAPER_DRIVE_PLANNER},
+    {"soc-mpc-learned", "the same, with tapers that nobody tells: it learns them", false, NULL, THROUGHPUT,
+     true, -1},
+    {"mpc", "the same planner, without the taper", false, NULL, THROUGHPUT, false, TAPER_DRIVE_PLANNER},
+    {"soc-mpc-log", "planner of the paper, by log utility (eq. 7)", true, NULL, LOG_UTILITY, false, -1},
+    {"mpc-log", "the same, without the taper (eq. 4)", false, NULL, LOG_UTILITY, false, -1},
+    {"edf", "earliest deadline first, without the taper", false, propose_edf, THROUGHPUT, false,
      TAPER_DRIVE_EDF},
-    {"llf", "least laxity first, clamped to the taper", true, propose_llf, THROUGHPUT, TAPER_DRIVE_LLF},
+    {"edf-soc", "earliest deadline first, clamped to the taper", true, propose_edf, THROUGHPUT, false,
+     TAPER_DRIVE_EDF},
+    {"llf", "least laxity first, clamped to the taper", true, propose_llf, THROUGHPUT, false,
+     TAPER_DRIVE_LLF},
     {"equal-share", "equal parts of the site limit, without the taper", false, propose_equal_share,
-     THROUGHPUT, -1},
+     THROUGHPUT, false, -1},
 };
 const unsigned sim_policy_count = sizeof sim_policies / sizeof sim_policies[0];
 

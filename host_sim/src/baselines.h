@@ -15,7 +15,8 @@ typedef struct {
     void (*propose)(void *tick_ms, const taper_snapshot_t *snapshot, int32_t site_limit_W,
                     taper_proposal_t *proposal);
     taper_objective_t objective; /**< of the planner */
-    int on_board; /**< taper_drive_policy_t; negative: only this program has it */
+    bool learns;                 /**< the station learns tapers from what vehicles accept */
+    int on_board;                /**< taper_drive_policy_t; negative: only this program has it */
 } sim_policy_t;
 
 extern const sim_policy_t sim_policies[];

@@ -35,6 +35,9 @@ static void begin_session(sim_evse_t *evse) {
 void sim_evse_plug(sim_evse_t *evse, const sim_session_t *session) {
     evse->vehicle = session;
     evse->energy_kwh = 0.0;
+    if (evse->errors != NULL) {
+        evse->wrong = sim_errors_of(evse->errors, session->id);
+    }
     forget_setpoint(evse);
     begin_session(evse);
 }

@@ -8,6 +8,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "errors.h"
 #include "sessions.h"
 #include "taper/e2e.h"
 #include "taper/message.h"
@@ -46,6 +47,8 @@ typedef struct {
     uint8_t session;                  /**< number on the wire, 1..255 */
     uint8_t revision;                 /**< of the EV_PARAM frames, 0..15 */
     uint8_t counter[SIM_EVSE_FRAMES]; /**< of the protected frames */
+    const sim_errors_t *errors;       /**< what vehicles and meter get wrong; NULL: nothing */
+    sim_vehicle_errors_t wrong;       /**< and the present vehicle */
 } sim_evse_t;
 
 /** No vehicle. `config` must outlive it; the end-to-end counters start from `first_counter` (+ 3 per frame). */

@@ -20,14 +20,29 @@ static int32_t soc_permille(double soc) {
     return 5 * nearest(soc * 200.0);
 }
 
+/** A SOC as the vehicle tells it, or absent. */
+static int32_t told_soc_permille(const sim_evse_t *evse, double soc) {
+    if (evse->errors == NULL) {
+        return soc_permille(soc);
+    }
+    return evse->errors->soc_absent ? TAPER_ABSENT
+                                    : soc_permille(fmin(fmax(soc + evse->wrong.soc, 0.0), 1.0));
+}
+
+/** What the meter makes of a quantity, as a factor. */
+static double metered(const sim_evse_t *evse) {
+    return evse->errors == NULL ? 1.0 : evse->wrong.metered;
+}
+
 static taper_message_t evse_status(const sim_evse_t *evse) {
     taper_message_t message = {.kind = TAPER_MESSAGE_EVSE_STATUS};
     taper_evse_status_t *status = &message.as.evse_status;
     status->pilot = evse->vehicle == NULL  ? TAPER_PILOT_A
                     : sim_evse_wants(evse) ? TAPER_PILOT_C
                                            : TAPER_PILOT_B;
+    const double metered_A = evse->current_A * metered(evse);
     for (unsigned phase = 0; phase < sim_evse_conductors(evse) && phase < 3; phase++) {
-        status->current_mA[phase] = nearest(evse->current_A * 1000.0);
+        status->current_mA[phase] = nearest(metered_A * 1000.0);
     }
     status->contactor_closed = evse->vehicle != NULL && sim_evse_offered_mA(evse, evse->setpoint_mA) > 0;
     status->locked = evse->vehicle != NULL;
@@ -42,7 +57,7 @@ static taper_message_t ev_status(const sim_evse_t *evse) {
     // The limit of the charger is flat: it says nothing about the taper of the battery.
     const double max_mA = sim_session_most_kw(evse->vehicle) / sim_evse_kw_per_A(evse) * 1000.0;
     return (taper_message_t){.kind = TAPER_MESSAGE_EV_STATUS,
-                             .as.ev_status = {.soc_permille = soc_permille(sim_evse_soc(evse)),
+                             .as.ev_status = {.soc_permille = told_soc_permille(evse, sim_evse_soc(evse)),
                                               .soc_age_s = 0,
                                               .max_mA = (int32_t)ceil(max_mA - 1e-6),
                                               .complete = !sim_evse_wants(evse),
@@ -53,7 +68,7 @@ static taper_message_t evse_elec(const sim_evse_t *evse) {
     const double counted_kwh = evse->energy_kwh - evse->counted_from_kwh;
     return (taper_message_t){.kind = TAPER_MESSAGE_EVSE_ELEC,
                              .as.evse_elec = {.voltage_mV = evse->config->voltage_mV,
-                                              .power_W = nearest(evse->power_kw * 1000.0),
+                                              .power_W = nearest(evse->power_kw * metered(evse) * 1000.0),
                                               .energy_Wh = (int32_t)floor(counted_kwh * 1000.0 + 1e-6)}};
 }
 
@@ -65,7 +80,7 @@ static taper_message_t ev_param_a(const sim_evse_t *evse) {
                                                .capacity_Wh = nearest(evse->vehicle->battery_kwh * 1000.0),
                                                .soc_target_permille = soc_permille(evse->vehicle->soc_target),
                                                .soc_minimum_permille = TAPER_ABSENT,
-                                               .soc_plug_in_permille = soc_permille(soc_from)}};
+                                               .soc_plug_in_permille = told_soc_permille(evse, soc_from)}};
 }
 
 /** Minute of the departure that the driver told; the clock of TIME_SYNC is the time of the simulation. */
@@ -94,10 +109,13 @@ static taper_message_t ev_param_c(const sim_evse_t *evse) {
 }
 
 static taper_message_t ev_param_d(const sim_evse_t *evse) {
+    const sim_session_t *vehicle = evse->vehicle;
+    const double factor = evse->errors == NULL ? 1.0 : evse->wrong.taper;
+    const double taper_kw = fmin(vehicle->taper_kw * factor, vehicle->max_kw);
     return (taper_message_t){.kind = TAPER_MESSAGE_EV_PARAM_D,
                              .as.ev_param_d = {.revision = evse->revision,
                                                .session = evse->session,
-                                               .taper_W = nearest(evse->vehicle->taper_kw * 1000.0)}};
+                                               .taper_W = nearest(taper_kw * 1000.0)}};
 }
 
 static taper_message_t ev_param_e(const sim_evse_t *evse) {

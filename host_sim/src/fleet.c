@@ -16,10 +16,19 @@ void sim_fleet_init(sim_fleet_t *fleet, const taper_station_config_t *station, c
     }
 }
 
+void sim_fleet_set_errors(sim_fleet_t *fleet, const sim_errors_t *errors) {
+    for (unsigned i = 0; i < fleet->station->connector_count; i++) {
+        fleet->evse[i].errors = errors;
+    }
+}
+
 /** Send the first `count` kinds of frames. */
 static bool send_first(sim_fleet_t *fleet, sim_evse_t *evse, unsigned count) {
     bool sent = true;
     for (unsigned k = 0; k < count; k++) {
+        if (evse->errors != NULL) {
+            sim_errors_measure(evse->errors, &evse->wrong);
+        }
         const taper_message_t message = sim_evse_message(evse, (sim_evse_frame_t)k);
         sent = sim_wire_send(fleet->port, &message, &evse->counter[k]) && sent;
     }

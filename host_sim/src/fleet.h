@@ -32,6 +32,9 @@ typedef struct {
 void sim_fleet_init(sim_fleet_t *fleet, const taper_station_config_t *station, const taper_port_t *port,
                     bool tells_taper, uint64_t seed);
 
+/** What vehicles and meters get wrong from here on. `errors` must outlive the fleet. */
+void sim_fleet_set_errors(sim_fleet_t *fleet, const sim_errors_t *errors);
+
 /** A connector reports itself and its vehicle. @return false: the bus is full. */
 bool sim_fleet_report(sim_fleet_t *fleet, unsigned connector);
 

@@ -31,6 +31,7 @@ typedef struct {
 static taper_planning_t planning_of(const sim_options_t *options, const taper_planning_t *own) {
     taper_planning_t planning = *own;
     planning.objective = (uint8_t)options->policy->objective;
+    planning.learns_taper = planning.learns_taper || options->learns || options->policy->learns;
     if (options->horizon_steps > 0) {
         planning.horizon_steps = (uint8_t)options->horizon_steps;
     }
@@ -78,6 +79,9 @@ static int run_case(const sim_options_t *options, const sim_case_t *run) {
     results.seed = run->seed;
     results.priced = run->prices != NULL;
     results.price_weight = options->price_weight;
+    results.learns = run->station->planning.learns_taper;
+    results.errors = options->errs ? run->errors : NULL;
+    results.unannounced = run->unannounced;
     int code = SIM_EXIT_INPUT;
     if (sim_world_run(run, &results) && (options->out == NULL || sim_results_write(&results, options->out))) {
         sim_results_print(&results, stdout);
@@ -89,7 +93,7 @@ static int run_case(const sim_options_t *options, const sim_case_t *run) {
 
 /** Files that are written in the course of a run. */
 typedef struct {
-    FILE *problems, *frames; /**< NULL: not wanted */
+    FILE *problems, *frames, *tapers; /**< NULL: not wanted */
 } logs_t;
 
 /** @return false, after one line on stderr, if a file of this name cannot be written. */
@@ -117,8 +121,9 @@ static bool close_log(FILE *file, const char *name) {
 }
 
 static bool close_logs(const sim_options_t *options, const logs_t *logs) {
-    const bool good = close_log(logs->problems, options->problems_file);
-    return close_log(logs->frames, options->frames_file) && good;
+    const bool problems = close_log(logs->problems, options->problems_file);
+    const bool frames = close_log(logs->frames, options->frames_file);
+    return close_log(logs->tapers, options->tapers_file) && problems && frames;
 }
 
 static void note_missing_planner(const sim_options_t *options) {
@@ -149,7 +154,9 @@ static int load_and_run(const sim_options_t *options, const taper_station_config
     sim_course_t limits = {0};
     sim_course_t prices = {0};
     sim_sessions_t sessions = {0};
-    logs_t logs = {NULL, NULL};
+    logs_t logs = {NULL, NULL, NULL};
+    sim_errors_t errors = options->errors;
+    errors.seed = options->seed;
     sim_link_t *link = NULL;
     int code = SIM_EXIT_INPUT;
     if (sim_sessions_load(&sessions, options->sessions_file, station->connector_count) &&
@@ -158,7 +165,7 @@ static int load_and_run(const sim_options_t *options, const taper_station_config
         (options->price_file == NULL || sim_prices_load(&prices, options->price_file)) &&
         (options->out == NULL || sim_output_check(options->out)) &&
         open_log(&logs.problems, options->problems_file) && open_log(&logs.frames, options->frames_file) &&
-        open_link(options, &link)) {
+        open_log(&logs.tapers, options->tapers_file) && open_link(options, &link)) {
         note_missing_planner(options);
         const sim_case_t run = {.station = station,
                                 .solver = taper_setup_solver(options->station),
@@ -170,9 +177,12 @@ static int load_and_run(const sim_options_t *options, const taper_station_config
                                 .limits = &limits,
                                 .prices = options->price_file == NULL ? NULL : &prices,
                                 .seed = options->seed,
+                                .errors = options->errs ? &errors : NULL,
+                                .unannounced = options->unannounced,
                                 .link = link,
                                 .problems = logs.problems,
-                                .frames = logs.frames};
+                                .frames = logs.frames,
+                                .tapers = logs.tapers};
         code = run_case(options, &run);
         link->calls->close(link);
     }

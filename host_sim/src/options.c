@@ -14,6 +14,9 @@
 /** The firmware takes no greater one. */
 #define MOST_LAMBDA     10000
 #define DEFAULT_STATION "garage"
+/** Greatest errors of SOC and of the meter. */
+#define MOST_SOC_ERROR 0.1
+#define MOST_NOISE     0.1
 /** A whole solve of the largest station takes an emulator on a busy machine some seconds. */
 #define BUS_TIMEOUT_S     60
 #define LONGEST_TIMEOUT_S 3600
@@ -40,6 +43,11 @@ static const char description[] =
     "PRICE CSV: time_s [s], ascending, and price_per_kwh in any currency, -32.767..32.767; each price holds "
     "until "
     "the next one, the first one before its time too.\n"
+    "\n"
+    "TAPERS CSV: session_id, share of the charge, learned (some sample showed it) and sure (to 2.5 %) 0 or "
+    "1, limit by the station and the vehicle's own "
+    "[kW], at that energy and at the end of the charge, and error: the greater difference of the two, as a "
+    "share of max_kw.\n"
     "\n"
     "OUTPUT in DIR: summary.json, sessions.csv, steps.csv, connectors.csv. Equal runs give equal bytes, "
     "except for solve_ms in summary.json, which is wall time. A session that is plugged in at the first tick "
@@ -84,6 +92,13 @@ enum {
     KEY_OUT,
     KEY_PROBLEMS,
     KEY_FRAMES,
+    KEY_LEARN,
+    KEY_SOC,
+    KEY_SOC_ERROR,
+    KEY_TAPER_ERROR,
+    KEY_METER_NOISE,
+    KEY_UNANNOUNCED,
+    KEY_TAPERS,
     KEY_BUS,
     KEY_BUS_TIMEOUT,
     KEY_ITERATIONS,
@@ -125,7 +140,24 @@ static const struct argp_option options[] = {
      0},
     {"min-current-a", KEY_MINIMUM, "X", 0,
      "Least current per phase [A] of every connector; 0: any (default: the station's own)", 0},
-    {"seed", KEY_SEED, "N", 0, "Decides in which order nodes send; no result depends on it (default: 0)", 0},
+    {"seed", KEY_SEED, "N", 0,
+     "Decides in which order nodes send; no result depends on it (default: 0), but for errors of SOC, taper "
+     "and meter",
+     0},
+    {"learn-taper", KEY_LEARN, NULL, 0,
+     "The station learns tapers from what vehicles accept; what they tell is a first guess", 0},
+    {"tapers", KEY_TAPERS, "FILE", 0,
+     "Write what it has learned after 10, 25 and 50 % of each charge to this file (CSV, see below)", 0},
+    {"soc", KEY_SOC, "HOW", 0, "absent: vehicles tell no SOC; exact (default)", 0},
+    {"soc-error", KEY_SOC_ERROR, "P", 0,
+     "Each vehicle's SOC is off by a constant, uniform within P, 0..0.1; the energy that it wants is right",
+     0},
+    {"taper-error", KEY_TAPER_ERROR, "P", 0,
+     "Each vehicle's taper_kw is told wrong by a factor, uniform within 1-P..1+P, P 0..1", 0},
+    {"meter-noise", KEY_METER_NOISE, "P", 0,
+     "Each report of current or power is wrong by a factor, normal with standard deviation P, 0..0.1", 0},
+    {"limit-unannounced", KEY_UNANNOUNCED, NULL, 0,
+     "The course of --limit-csv is not told ahead: the station learns of each change when it comes", 0},
     {"problems", KEY_PROBLEMS, "FILE", 0,
      "Write every planning problem to this file (input of planner_probe)", 0},
     {"frames", KEY_FRAMES, "FILE", 0, "Write every frame that the station sends to this file (candump -l)",
@@ -197,6 +229,21 @@ static void set_replan(sim_options_t *chosen, const char *text, struct argp_stat
     }
 }
 
+static void set_soc(sim_options_t *chosen, const char *text, struct argp_state *state) {
+    chosen->errors.soc_absent = strcmp(text, "absent") == 0;
+    if (!chosen->errors.soc_absent && strcmp(text, "exact") != 0) {
+        argp_error(state, "--soc: neither absent nor exact: '%s'", text);
+    }
+}
+
+static double share(const char *option, const char *text, double most, struct argp_state *state) {
+    const double value = taper_argument_not_negative(option, text, state);
+    if (value > most) {
+        argp_error(state, "%s: above %g: '%s'", option, most, text);
+    }
+    return value;
+}
+
 /** The name of an option. */
 static const char *name_of(int key) {
     const struct argp_option *option = options;
@@ -238,6 +285,10 @@ static void check_bus(const sim_options_t *chosen, struct argp_state *state) {
         chosen->replan_given) {
         argp_error(state, "--bus: how a board plans is in its own description of the station");
     }
+    if (chosen->learns || chosen->tapers_file != NULL) {
+        argp_error(state,
+                   "--learn-taper and --tapers: whether a board (--bus) learns is in its own description");
+    }
     if (taper_setup_buses(station) > 1) {
         argp_error(state, "--bus: station %s has %u CAN buses, and SLCAN carries one", station->name,
                    taper_setup_buses(station));
@@ -266,6 +317,12 @@ static void check_run(const sim_options_t *chosen, struct argp_state *state) {
     if (chosen->min_current_A > most_A) {
         argp_error(state, "--min-current-a: above %g A, the most that a connector of this station gives",
                    most_A);
+    }
+    if (chosen->unannounced && chosen->limit_file == NULL) {
+        argp_error(state, "--limit-unannounced needs --limit-csv");
+    }
+    if (chosen->errors.soc_absent && chosen->errors.soc > 0.0) {
+        argp_error(state, "--soc absent and --soc-error exclude each other");
     }
     if (chosen->horizon_steps > taper_stations[chosen->station]->steps) {
         argp_error(state, "--horizon-steps: station %s has %u", taper_stations[chosen->station]->name,
@@ -355,6 +412,23 @@ static bool parse_planning(int key, const char *text, sim_options_t *chosen, str
     return true;
 }
 
+/** The options of what the station does not know. @return whether `key` is one. */
+static bool parse_errors(int key, const char *text, sim_options_t *chosen, struct argp_state *state) {
+    sim_errors_t *errors = &chosen->errors;
+    switch (key) {
+    case KEY_LEARN: chosen->learns = true; return true;
+    case KEY_TAPERS: chosen->tapers_file = text; return true;
+    case KEY_UNANNOUNCED: chosen->unannounced = true; break;
+    case KEY_SOC: set_soc(chosen, text, state); break;
+    case KEY_SOC_ERROR: errors->soc = share("--soc-error", text, MOST_SOC_ERROR, state); break;
+    case KEY_TAPER_ERROR: errors->taper = share("--taper-error", text, 1.0, state); break;
+    case KEY_METER_NOISE: errors->meter_noise = share("--meter-noise", text, MOST_NOISE, state); break;
+    default: return false;
+    }
+    chosen->errs = true;
+    return true;
+}
+
 /** The options of --bus, of what goes beside the results, and --iterations. @return whether `key` is one. */
 static bool parse_bus(int key, const char *text, sim_options_t *chosen, struct argp_state *state) {
     switch (key) {
@@ -394,6 +468,7 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     case ARGP_KEY_END: check(chosen, state); break;
     default:
         return parse_bus(key, text, chosen, state) || parse_planning(key, text, chosen, state) ||
+                       parse_errors(key, text, chosen, state) ||
                        parse_replay(key, text, &chosen->replay, state)
                    ? 0
                    : ARGP_ERR_UNKNOWN;

@@ -226,6 +226,17 @@ static void add_board(cJSON *object, sim_results_t *results) {
     add_known_count(board, "stack_size_b", has_stack, hardware->stack_size_B);
 }
 
+/** What the station was not told, or told wrong. */
+static void add_errors(cJSON *object, const sim_results_t *results) {
+    const sim_errors_t *errors = results->errors;
+    cJSON *inner = cJSON_AddObjectToObject(object, "errors");
+    cJSON_AddStringToObject(inner, "soc", errors->soc_absent ? "absent" : "exact");
+    add_fixed(inner, "soc_error", errors->soc, 4);
+    add_fixed(inner, "taper_error", errors->taper, 4);
+    add_fixed(inner, "meter_noise", errors->meter_noise, 4);
+    cJSON_AddBoolToObject(inner, "limit_unannounced", results->unannounced);
+}
+
 /** The text of summary.json; NULL without memory. To be freed with cJSON_free(). */
 static char *summary_json(sim_results_t *results) {
     const totals_t totals = sum_up(results);
@@ -256,6 +267,12 @@ static char *summary_json(sim_results_t *results) {
     add_given(object, "energy_cost", results->priced, results->cost, 4);
     add_given(object, "cost_per_kwh", per_kwh, per_kwh ? results->cost / totals.delivered_kwh : 0.0, 5);
     add_given(object, "price_weight", results->price_weight >= 0.0, results->price_weight, 3);
+    if (results->learns) {
+        cJSON_AddTrueToObject(object, "learns_taper");
+    }
+    if (results->errors != NULL) {
+        add_errors(object, results);
+    }
     if (results->hardware.known) {
         add_board(object, results);
     }

@@ -46,9 +46,12 @@ typedef struct {
     sim_text_t steps, connectors;
     sim_samples_t iterations, solve_ms;
     double peak_kw;
-    bool priced;         /**< `cost` means something */
-    double cost;         /**< of the energy drawn from the grid, in the currency of the prices */
-    double price_weight; /**< negative: the station's own */
+    bool priced;                /**< `cost` means something */
+    double cost;                /**< of the energy drawn from the grid, in the currency of the prices */
+    double price_weight;        /**< negative: the station's own */
+    bool learns;                /**< the station learns tapers */
+    const sim_errors_t *errors; /**< of vehicles and meters; NULL: none of these were asked for. Borrowed */
+    bool unannounced;           /**< one of these: the course of the limit was not told ahead */
     int64_t tick_s;
     uint64_t seed;
     double min_current_A; /**< negative: the station's own */

@@ -13,6 +13,7 @@
 #include "problems.h"
 #include "progress.h"
 #include "queue.h"
+#include "tapers.h"
 
 /** Connectors echo their first setpoints this long after the tick began [ms]. */
 #define ECHO_ms TAPER_EVSE_STATUS_CYCLE_ms
@@ -41,6 +42,7 @@ typedef struct {
     uint32_t curve_ms; /**< its clock, which counts rounds */
     sim_queue_t queue;
     sim_account_t account;
+    sim_tapers_t tapers;
     uint32_t reaction_ms;                   /**< of the slowest vehicle */
     uint64_t random;                        /**< state of next_random() */
     uint8_t turn[TAPER_MAX_CONNECTORS + 1]; /**< nodes in the order of sending; the last is the gateway */
@@ -258,6 +260,7 @@ static bool end_tick(world_t *world) {
         return false;
     }
     sim_account_end(&world->account, world->link->state.mode, records ? outlook : NULL);
+    sim_tapers_note(&world->tapers, &world->fleet, world->link->station);
     return true;
 }
 
@@ -313,8 +316,10 @@ static world_t *new_world(const sim_case_t *run, sim_results_t *results) {
         world->reaction_ms = reaction_ms > world->reaction_ms ? reaction_ms : world->reaction_ms;
     }
     sim_fleet_init(&world->fleet, station, &world->port, run->policy->tells_taper, run->seed);
+    sim_fleet_set_errors(&world->fleet, run->errors);
+    sim_tapers_init(&world->tapers, run->tapers);
     sim_gateway_init(&world->gateway, run->limits, &world->port, world->tick_s, run->seed);
-    sim_curve_init(&world->curve, run->limits);
+    sim_curve_init(&world->curve, run->unannounced ? NULL : run->limits);
     sim_curve_set_prices(&world->curve, run->prices);
     sim_queue_init(&world->queue, run->sessions, world->fleet.evse, station->connector_count,
                    results->outcome);

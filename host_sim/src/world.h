@@ -7,6 +7,7 @@
 #include <stdio.h>
 
 #include "baselines.h"
+#include "errors.h"
 #include "limits_csv.h"
 #include "results.h"
 #include "sessions.h"
@@ -21,10 +22,13 @@ typedef struct {
     const sim_sessions_t *sessions;
     const sim_course_t *limits; /**< nowhere above the station's own site limit */
     const sim_course_t *prices; /**< of energy, per kWh; NULL: none */
-    uint64_t seed;              /**< decides in which order nodes send, and nothing else */
+    uint64_t seed;              /**< decides in which order nodes send, and nothing else without `errors` */
+    const sim_errors_t *errors; /**< of vehicles and meters; NULL: none */
+    bool unannounced;           /**< the gateway does not tell what the limit will be */
     sim_link_t *link;           /**< the station; not started yet */
     FILE *problems;             /**< where the planning problems go; NULL: nowhere */
     FILE *frames;               /**< where the station's frames go; NULL: nowhere */
+    FILE *tapers;               /**< where learned tapers go (tapers.h); NULL: nowhere. Not on a board */
 } sim_case_t;
 
 /**

@@ -59,8 +59,12 @@ static void watch_draw(taper_station_t *station, uint8_t i, uint32_t now_ms) {
         taper_alarm_raise(station, TAPER_EVENT_OVER_DRAW, connector->bus, connector->node, now_ms);
         *demand = (taper_demand_t){.booking = demand->booking}; /* what it draws still counts */
     } else if (demand->active) {
-        const int32_t cap_mA = draw->cap_mA - draw->cap_mA % TAPER_CURRENT_STEP_mA;
+        const int32_t most_mA = taper_learning_cap_mA(station, i, draw->cap_mA);
+        const int32_t cap_mA = most_mA - most_mA % TAPER_CURRENT_STEP_mA;
         demand->max_mA = taper_min_i32(demand->max_mA, taper_max_i32(cap_mA, demand->min_mA));
+    }
+    if (station->options.config->planning.learns_taper) {
+        taper_learning_look(station, i, report.measured_mA);
     }
 }
 
@@ -104,6 +108,9 @@ static void propose(taper_station_t *station, taper_mode_t mode) {
                         &station->proposal);
     } else {
         taper_station_propose_plan(station);
+    }
+    if (station->options.config->planning.learns_taper) {
+        taper_learning_probe(station);
     }
 }
 

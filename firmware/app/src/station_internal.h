@@ -37,6 +37,17 @@ uint32_t taper_node_guard_time(const taper_node_guard_t *guard, uint32_t at_ms, 
 bool taper_node_guard_passes(taper_station_t *station, taper_node_guard_t *guard, uint32_t per_second,
                              const taper_frame_t *frame);
 
+/* learning.c: tapers learned from what vehicles accept, where the configuration says so */
+
+/** A look at the vehicle of connector `i`, which draws `measured_mA` or absent: its demand gets the line that is known. */
+void taper_learning_look(taper_station_t *station, uint8_t i, int32_t measured_mA);
+
+/** The cap of a vehicle that leaves current unused (draw.h), raised where it leaves less than what shows a limit. */
+int32_t taper_learning_cap_mA(const taper_station_t *station, uint8_t i, int32_t cap_mA);
+
+/** Offer some vehicles more than their lines say, where they are to get all of that. */
+void taper_learning_probe(taper_station_t *station);
+
 /* decide.c */
 
 /** Snapshot, limits, plan, mode, proposal, target, setpoints. */

@@ -21,6 +21,7 @@
 #include "taper/e2e.h"
 #include "taper/event.h"
 #include "taper/fallback.h"
+#include "taper/learn.h"
 #include "taper/ledger.h"
 #include "taper/limits.h"
 #include "taper/planner.h"
@@ -144,6 +145,17 @@ typedef struct {
     int32_t need_Wh;    /**< what it wanted then */
 } taper_prospect_t;
 
+/** The taper that is being learned from one vehicle (learning.c). A restart begins it anew. */
+typedef struct {
+    taper_learn_t line;
+    uint8_t session;    /**< whose it is; 0: nobody's yet */
+    uint8_t doublings;  /**< of the margin: offers above the line were taken whole so many times in a row */
+    bool shown;         /**< it has limited itself since it is offered more */
+    bool rests;         /**< it is offered no more than the line */
+    int32_t settled_mA; /**< of what it is offered, what it had time to rise to */
+    uint32_t since_ms;  /**< `rests`, or else `shown` holds, in the world's time */
+} taper_learning_t;
+
 /** What is in the port's store to survive a restart (record.c), written whole, two copies in turn. */
 typedef struct {
     uint32_t sequence;   /**< of the newest record */
@@ -168,8 +180,11 @@ typedef struct {
     taper_shape_t shape;
     taper_draw_t draw[TAPER_MAX_CONNECTORS];
     taper_conductors_t conductors[TAPER_MAX_CONNECTORS];
-    taper_health_t health; /**< of the planner */
-    taper_self_t self;     /**< of this controller */
+    taper_learning_t
+        learning[TAPER_MAX_CONNECTORS]; /**< where the configuration says that tapers are learned */
+    uint32_t learned_ms;                /**< when the planner was last told that a line has moved; 0: never */
+    taper_health_t health;              /**< of the planner */
+    taper_self_t self;                  /**< of this controller */
     taper_stranger_t stranger[TAPER_STRANGERS];
     taper_transfers_t transfers;
     union {
@@ -208,8 +223,8 @@ typedef struct {
     uint32_t second_ms; /**< when PLAN and CTRL_DIAG last went out */
     uint8_t next_plan, next_diag;
     int32_t plan_W[TAPER_MAX_STEPS][TAPER_MAX_CONNECTORS]; /**< the last finished plan */
-    uint8_t plan_session[TAPER_MAX_CONNECTORS];             /**< whom it was made for */
-    bool plan_waits[TAPER_MAX_CONNECTORS];                  /**< he waits for a lower price */
+    uint8_t plan_session[TAPER_MAX_CONNECTORS];            /**< whom it was made for */
+    bool plan_waits[TAPER_MAX_CONNECTORS];                 /**< he waits for a lower price */
     uint32_t plan_made_ms;
     bool plan_usable;
     int32_t planned_limit_W; /**< site limit and table revision of the last problem */

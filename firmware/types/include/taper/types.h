@@ -202,7 +202,7 @@ typedef struct {
     int32_t capacity_Wh;     /**< > 0, or 0: unknown (no taper then) */
     int32_t need_Wh;         /**< energy still wanted, > 0 */
     int32_t peak_W;          /**< line of the taper, at SOC 0, >= 0; may be above what `max_mA` allows */
-    int32_t taper_W;         /**< fall of that from SOC 0 to SOC 1, 0..peak_W */
+    int32_t taper_W;         /**< fall of that from SOC 0 to SOC 1, 0..peak_W; a learned one may reach 0 earlier */
     int32_t second_peak_W;   /**< another such line, of which the lower one counts; 0: there is none */
     int32_t second_taper_W;  /**< 0..second_peak_W */
     int32_t max_mA;          /**< least of connector and vehicle limit, per phase */

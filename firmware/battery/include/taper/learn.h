@@ -1,0 +1,91 @@
+/**
+ * The taper learned on line, from what a vehicle accepts.
+ *
+ * Model: the vehicle's limit is a line in the energy `e` charged since its session began,
+ *
+ *     limit(e) = level - fall * (e - centre),  fall >= 0, never below 0
+ *
+ * so neither SOC nor capacity is needed. The line is a recursive weighted least-squares fit of samples (e, power), kept as
+ * centred sums (Welford's), which single precision bears for any energy. What the vehicle told is its first guess, and
+ * counts as a weak sample: off by 30 % of its level, and by a third of it over the charge. So what is told holds as long as,
+ * and as far as, samples do not know better.
+ *
+ * - **Both sides.** A vehicle that takes less than it could shows its limit. One that takes all shows only that its limit is
+ *   not less: that lifts a line that lies below, and lowers none.
+ * - **Outliers.** A residual counts by the deviation that is expected at its energy, so that a poor line doubts itself before
+ *   it doubts a sample; beyond TAPER_LEARN_HUBER of these its weight falls (Huber).
+ * - **Change.** Residuals that lie on one side in a row (a CUSUM) show that the line is wrong: a wrong first guess, or the knee
+ *   of a battery that was flat so far. The line is then begun anew from the sample, with its fall as a weak guess.
+ * - **Memory.** At most TAPER_LEARN_MOST samples weigh in full; beyond, the oldest fade.
+ *
+ * - **Noise.** The deviation of a measurement is taken from what changes from look to look, which no wrong line does: 1 to
+ *   6 % of it, and half a step of its resolution.
+ */
+#ifndef TAPER_LEARN_H
+#define TAPER_LEARN_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "taper/real.h"
+#include "taper/types.h"
+
+/** Samples that weigh in full: 2.3 h of one each second. */
+#define TAPER_LEARN_MOST 8192
+/** Residuals beyond so many deviations weigh less. */
+#define TAPER_LEARN_HUBER 2.5
+/** A line whose deviation at the end of the charge is below this share of the vehicle's peak is sure [permille]. */
+#define TAPER_LEARN_SURE_permille 25
+
+/** What is known of one vehicle. The caller's memory; its content is private. [kW], [kWh] */
+typedef struct {
+    taper_real_t weight;        /**< of all samples; 0: not begun */
+    taper_real_t centre, level; /**< their weighted means: energy and power */
+    taper_real_t spread, slant; /**< sums of squares of energy, and of its products with power */
+    taper_real_t least_spread;  /**< what the fall is held by at least: the doubt in what was told */
+    taper_real_t rises, falls;  /**< CUSUMs */
+    taper_real_t peak;          /**< what shares are of */
+    taper_real_t noted_limit, noted_fall; /**< at energy 0, when taper_learn_moved() was true last */
+    taper_real_t noise;                   /**< deviation of a measurement, as a share of it */
+    taper_real_t strayed;                 /**< by how much the last look was off, the same; beyond 1: none */
+    bool noted;                           /**< it was, ever */
+    bool knows;                           /**< a sample has moved it */
+} taper_learn_t;
+
+/** One look at a vehicle. */
+typedef struct {
+    int32_t energy_Wh; /**< charged since the session began */
+    int32_t power_W;   /**< that it draws */
+    int32_t step_W;    /**< resolution of that, >= 0 */
+    int32_t offered_W; /**< most that it may draw, for long enough; 0: that has changed just now */
+    bool limits; /**< it could take more and does not: this is its limit. Else its limit is at least this */
+} taper_learn_sample_t;
+
+/** Begin with what `told` says, at `energy_Wh` of its session. Cost: constant, like that of all calls here. */
+void taper_learn_begin(taper_learn_t *learn, const taper_demand_t *told, int32_t energy_Wh);
+
+/** Take a look into account. Energies or powers that are negative are ignored. */
+void taper_learn_take(taper_learn_t *learn, const taper_learn_sample_t *sample);
+
+/** The limit at an energy [W], >= 0. */
+int32_t taper_learn_limit_W(const taper_learn_t *learn, int32_t energy_Wh);
+
+/** The deviation of a measurement [permille of it]. */
+int32_t taper_learn_noise_permille(const taper_learn_t *learn);
+
+/** Whether some sample was taken into account: before, taper_learn_apply() changes nothing. */
+bool taper_learn_knows(const taper_learn_t *learn);
+
+/** Whether the limit is known for the next `need_Wh` (TAPER_LEARN_SURE_permille). */
+bool taper_learn_is_sure(const taper_learn_t *learn, int32_t energy_Wh, int32_t need_Wh);
+
+/**
+ * Replace the taper of `demand`, at `energy_Wh`, by the line: `peak_W` and `taper_W`; and a battery that is not known by one
+ * that ends with the need. `taper_W` may be above `peak_W`: the line reaches 0 before SOC 1.
+ */
+void taper_learn_apply(const taper_learn_t *learn, int32_t energy_Wh, taper_demand_t *demand);
+
+/** Whether the line has moved by more than `permille` of the peak, now or after `need_Wh`, since this was true last. */
+bool taper_learn_moved(taper_learn_t *learn, int32_t energy_Wh, int32_t need_Wh, int32_t permille);
+
+#endif
