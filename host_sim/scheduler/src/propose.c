@@ -1,0 +1,48 @@
+/* What plan or EDF want: the firmware's planner, worked to its end within the call. */
+#include "scheduler_internal.h"
+#include "taper/fallback.h"
+
+/** The present limit as a message of the gateway that has just come, beside the known course. */
+static taper_limit_now_t limit_now(taper_scheduler_t *scheduler, uint32_t now_ms) {
+    const taper_site_limit_t message = {
+        .active = true,
+        .limit_W = scheduler->limit_W,
+        .failsafe_W = TAPER_ABSENT,
+        .validity_s = TAPER_ABSENT,
+    };
+    taper_limits_apply(&scheduler->limits, &message, now_ms);
+    taper_limits_update(&scheduler->limits, now_ms);
+    return taper_limits_now(&scheduler->limits, now_ms);
+}
+
+/** Solve, from the last answer on. @return whether the plan may be used. */
+static bool make_plan(taper_scheduler_t *scheduler, uint32_t now_ms) {
+    taper_planner_t *planner = &scheduler->planner;
+    taper_course_t course;
+    taper_limits_course(&scheduler->limits, now_ms, &course);
+    taper_planner_start(planner, &scheduler->snapshot, &course);
+    while (taper_planner_run(planner, TAPER_MAX_ITERATIONS) == TAPER_VERDICT_SOLVING) {
+    }
+    scheduler->account.verdict = planner->verdict;
+    scheduler->account.iterations = taper_planner_iterations(planner);
+    return taper_planner_is_usable(planner->verdict);
+}
+
+/** The plan's first step is the wish, what is useful beyond it the ceiling, as in the firmware's station. */
+static void follow_plan(taper_scheduler_t *scheduler) {
+    taper_proposal_t *proposal = &scheduler->proposal;
+    for (uint8_t i = 0; i < scheduler->snapshot.count; i++) {
+        const int32_t plan_W = taper_planner_power_W(&scheduler->planner, i, 0);
+        proposal->wish_W[i] = taper_min_i32(plan_W, proposal->ceiling_W[i]);
+    }
+}
+
+void scheduler_propose(taper_scheduler_t *scheduler, uint32_t now_ms) {
+    scheduler->supply = limit_now(scheduler, now_ms).supply;
+    taper_propose_edf(&scheduler->snapshot, scheduler->period_ms, &scheduler->proposal);
+    scheduler->account.planned = 0;
+    if (scheduler->options.policy == TAPER_SCHEDULER_SOC_MPC && make_plan(scheduler, now_ms)) {
+        scheduler->account.planned = 1;
+        follow_plan(scheduler);
+    }
+}
