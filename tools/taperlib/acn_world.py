@@ -171,9 +171,9 @@ def _outcome(name: str, algorithm: BaseAlgorithm, simulator: Simulator) -> Outco
     shares = np.abs(network.constraint_current(rates_a)) / network.magnitudes[:, np.newaxis]
     return Outcome(
         name=name,
-        delivered_kwh=sum(min(car.energy_delivered, car.requested_energy) for car in cars),
-        requested_kwh=sum(car.requested_energy for car in cars),
-        satisfied=sum(car.requested_energy - car.energy_delivered <= FULL_KWH for car in cars),
+        delivered_kwh=float(sum(min(car.energy_delivered, car.requested_energy) for car in cars)),
+        requested_kwh=float(sum(car.requested_energy for car in cars)),
+        satisfied=int(sum(car.requested_energy - car.energy_delivered <= FULL_KWH for car in cars)),
         sessions=len(cars),
         peak_a=float(rates_a.sum(axis=0).max()),
         utilisation=float(shares.max()),

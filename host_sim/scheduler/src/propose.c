@@ -28,12 +28,23 @@ static bool make_plan(taper_scheduler_t *scheduler, uint32_t now_ms) {
     return taper_planner_is_usable(planner->verdict);
 }
 
-/** The plan's first step is the wish, what is useful beyond it the ceiling, as in the firmware's station. */
+/**
+ * The plan's first step, as power for as long as the vehicle is there: a step counts whole in the plan, so to who leaves before
+ * its end, its energy has to be given in less time.
+ */
+static int32_t planned_W(const taper_scheduler_t *scheduler, uint8_t i) {
+    const int64_t plan_W = taper_planner_power_W(&scheduler->planner, i, 0);
+    const int32_t step_s = scheduler->config.step_s;
+    const int32_t stay_s =
+        taper_max_i32(scheduler->snapshot.demand[i].departs_in_s, scheduler->options.period_s);
+    return taper_saturate_i32(stay_s < step_s ? plan_W * step_s / stay_s : plan_W);
+}
+
+/** The first step is the wish, what is useful beyond it the ceiling, as in the firmware's station. */
 static void follow_plan(taper_scheduler_t *scheduler) {
     taper_proposal_t *proposal = &scheduler->proposal;
     for (uint8_t i = 0; i < scheduler->snapshot.count; i++) {
-        const int32_t plan_W = taper_planner_power_W(&scheduler->planner, i, 0);
-        proposal->wish_W[i] = taper_min_i32(plan_W, proposal->ceiling_W[i]);
+        proposal->wish_W[i] = taper_min_i32(planned_W(scheduler, i), proposal->ceiling_W[i]);
     }
 }
 
