@@ -46,18 +46,18 @@ static void hold_limits_at_random(int32_t policy) {
     uint32_t state = 20260801;
     double most_A = 0;
     open_with("caltech", policy);
-    for (int round = 0; round < 30; round++) {
+    for (int round = 0; round < 12; round++) {
         const double now_s = 300.0 * round;
         plug_in_at_random(&state, now_s);
         taper_scheduler_set_limit(scheduler, 150 * random_share(&state));
         plan_at(now_s);
         assert_caltech_holds();
-        most_A = fmax(most_A, currents[0].current_A);
+        most_A = fmax(most_A, sum_A());
     }
     taper_scheduler_account_t account;
     taper_scheduler_account(scheduler, &account);
     TEST_ASSERT_EQUAL_INT32(0, account.lowered);
-    TEST_ASSERT_TRUE(most_A > 6); /* it did charge */
+    TEST_ASSERT_TRUE(most_A > 500); /* it did charge: the lines carry 720 A in sum */
 }
 
 static void test_limits_hold_for_random_vehicles_by_the_plan(void) {

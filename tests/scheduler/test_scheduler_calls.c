@@ -1,5 +1,6 @@
 /* The calls of host_sim/scheduler: what they refuse, and that they repeat. */
 #include <math.h>
+#include <stdbool.h>
 #include <stddef.h>
 #include <string.h>
 
@@ -19,12 +20,30 @@ static void test_a_station_is_opened_once(void) {
     taper_scheduler_close(other);
 }
 
+static void test_a_library_without_planner_says_so(void) {
+    taper_scheduler_options_t options;
+    taper_scheduler_account_t account;
+    taper_scheduler_defaults(&options);
+    const bool plans = options.policy == TAPER_SCHEDULER_SOC_MPC;
+    options.policy = TAPER_SCHEDULER_SOC_MPC;
+    TEST_ASSERT_EQUAL_INT32(plans ? TAPER_SCHEDULER_OK : TAPER_SCHEDULER_ERR_NO_PLANNER,
+                            taper_scheduler_open(&scheduler, "hub", &options));
+    if (scheduler == NULL) {
+        open_with("hub", TAPER_SCHEDULER_EDF_SOC);
+    }
+    plug_in_everywhere();
+    plan_at(0);
+    taper_scheduler_account(scheduler, &account);
+    TEST_ASSERT_EQUAL_INT32(plans, account.planned);
+    TEST_ASSERT_EQUAL_INT32(plans, account.iterations > 0);
+}
+
 static void test_the_same_calls_give_the_same_currents(void) {
     taper_scheduler_current_t first[MOST_CONNECTORS];
     for (int run = 0; run < 2; run++) {
         uint32_t state = 4711;
         open_with("caltech", best_policy());
-        for (int round = 0; round < 5; round++) {
+        for (int round = 0; round < 3; round++) {
             plug_in_at_random(&state, 300.0 * round);
             plan_at(300.0 * round);
         }
@@ -151,6 +170,7 @@ static void test_every_status_has_words(void) {
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_a_station_is_opened_once);
+    RUN_TEST(test_a_library_without_planner_says_so);
     RUN_TEST(test_the_same_calls_give_the_same_currents);
     RUN_TEST(test_options_out_of_range_are_refused);
     RUN_TEST(test_a_vehicle_out_of_range_is_refused_and_the_last_one_kept);

@@ -12,8 +12,8 @@
  * for what other simulators have and the firmware has not:
  *
  *   rates   An EVSE that knows only some currents gets the next lower one of them.
- *   fill    What rounding leaves over, and what the allocator's rows (linear, so they bound the length of a sum of phasors
- *           from above by up to 3.6 %) do not use, goes to the most urgent first: each current rises as far as the guard lets
+ *   fill    What rounding leaves over, and what the allocator's rows (linear, they bound the length of a sum of phasors from
+ *           above, by up to 15 %) do not use, goes to the most urgent first: each current rises as far as the guard lets
  *           it pass, which adds phasors exactly. A rise has to hold the limits however little of its current any pair of lines
  *           really draws: on the delta side of a transformer, less on one pair can be more on a line.
  *
@@ -114,8 +114,7 @@ typedef enum {
     TAPER_SCHEDULER_CONNECTOR_LIMIT = 2, /**< all that the connector can */
     TAPER_SCHEDULER_LIMIT = 3,           /**< a limit of site or group leaves no more */
     TAPER_SCHEDULER_WAITING = 4,         /**< no room for its least current, or kept off for a while */
-    TAPER_SCHEDULER_PLANNED =
-        5, /**< it has what the plan wants for it now: later is better, or others are before it */
+    TAPER_SCHEDULER_PLANNED = 5,         /**< the plan wants no more for it now */
 } taper_scheduler_why_t;
 
 /** The answer for one connector. */
@@ -127,12 +126,10 @@ typedef struct {
 
 /** How the last answer came about. */
 typedef struct {
-    int32_t
-        planned; /**< 1: by the plan; 0: by EDF, because it was told to, or because the plan was no good */
+    int32_t planned;    /**< 1: by the plan; 0: by EDF, as told, or for want of a good plan */
     int32_t verdict;    /**< taper_verdict_t of the solver: 2 solved, 3 inaccurate but usable; 0 with EDF */
     int32_t iterations; /**< of the solver */
-    int32_t
-        lowered; /**< answers so far that the guard refused at first; stays 0 unless there is a mistake in the library */
+    int32_t lowered;    /**< answers so far that the guard refused at first: 0, but for a mistake */
 } taper_scheduler_account_t;
 
 typedef struct taper_scheduler taper_scheduler_t;
@@ -199,7 +196,11 @@ TAPER_SCHEDULER_API int32_t taper_scheduler_set_rates(taper_scheduler_t *schedul
 TAPER_SCHEDULER_API int32_t taper_scheduler_set_vehicle(taper_scheduler_t *scheduler, int32_t connector,
                                                         const taper_scheduler_vehicle_t *vehicle);
 
-/** What the site may draw now for charging [kW], 0..3276.7, until the next such call; the described limit holds besides. */
+/**
+ * What the site may draw now for charging [kW], 0..3276.7, until the next such call; the described limit holds besides. One that
+ * changes again within 5 s flaps, as in the firmware (taper/limits.h): then its lowest value holds for 30 s.
+ * @return ERR_ARGUMENT for another.
+ */
 TAPER_SCHEDULER_API int32_t taper_scheduler_set_limit(taper_scheduler_t *scheduler, double limit_kW);
 
 /**
