@@ -213,6 +213,69 @@ static void test_who_has_time_waits_for_a_lower_price_and_gets_no_power_that_is_
     TEST_ASSERT_EQUAL_INT32(0, bench.station.setpoints.current_mA[0]);
 }
 
+static void start_planning(const taper_planning_t *planning, taper_station_config_t *config) {
+    taper_station_options_t options = with_solver();
+    *config = *options.config;
+    config->planning = *planning;
+    options.config = config;
+    bench_start(&options);
+}
+
+/** So many ticks of a second, with reports of the first `vehicles`. */
+static void pass_seconds(unsigned seconds, uint8_t vehicles) {
+    for (unsigned k = 0; k < seconds; k++) {
+        bench_send_all(vehicles, 30000);
+        bench_step();
+    }
+    TEST_ASSERT_EQUAL(TAPER_MODE_PLAN, taper_station_mode(&bench.station));
+}
+
+static uint32_t plans(void) {
+    return taper_station_counter(&bench.station, TAPER_COUNTER_PLANS);
+}
+
+static void test_by_the_papers_rule_a_plan_is_followed_step_by_step_until_a_vehicle_comes(void) {
+    taper_station_config_t config;
+    start_planning(&(taper_planning_t){.on_events = true, .horizon_steps = 3}, &config);
+    pass_seconds(100, 1); /* its vehicle takes nothing, which is an event too, after a minute */
+    const uint32_t made = plans();
+    bench.station.plan_W[1][0] = 3000; /* to tell the steps apart */
+    pass_seconds(800, 1);
+    TEST_ASSERT_GREATER_THAN_INT32(3000, bench.station.proposal.wish_W[0]);
+    pass_seconds(100, 1);
+    TEST_ASSERT_EQUAL_INT32(3000, bench.station.proposal.wish_W[0]);
+    TEST_ASSERT_EQUAL_UINT32(made, plans());
+    pass_seconds(1, 2);
+    TEST_ASSERT_EQUAL_UINT32(made + 1, plans());
+    pass_seconds(100, 2);
+    const uint32_t both = plans();
+    pass_seconds(2 * 900, 2); /* the horizon has three steps */
+    TEST_ASSERT_EQUAL_UINT32(both + 1, plans());
+}
+
+static void test_otherwise_a_plan_is_made_anew_in_every_step(void) {
+    taper_station_config_t config;
+    start_planning(&(taper_planning_t){.horizon_steps = 3}, &config);
+    pass_seconds(100, 1);
+    const uint32_t made = plans();
+    pass_seconds(3 * 900, 1);
+    TEST_ASSERT_EQUAL_UINT32(made + 3, plans());
+}
+
+static void test_by_the_log_utility_nobody_gets_more_than_is_planned(void) {
+    taper_station_config_t config;
+    const taper_planning_t planning = {.objective = TAPER_OBJECTIVE_LOG_UTILITY,
+                                       .lambda_milli_per_kWh2 = 100000};
+    start_planning(&planning, &config);
+    pass_seconds(1, 1);
+    bench.station.plan_W[0][0] = 5000;
+    pass_seconds(1, 1);
+    TEST_ASSERT_EQUAL_INT32(5000, bench.station.proposal.wish_W[0]);
+    TEST_ASSERT_EQUAL_INT32(5000, bench.station.proposal.ceiling_W[0]);
+    TEST_ASSERT_EQUAL_INT32(
+        7300, bench.station.target.current_mA[0]); /* up to the step, where it could take 11.6 A */
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_a_soc_frame_in_gives_a_setpoint_frame_out_through_every_hop);
@@ -224,5 +287,8 @@ int main(void) {
     RUN_TEST(test_row_5_the_greatest_values_of_the_wire_do_not_spoil_the_plan);
     RUN_TEST(test_row_26_a_clock_that_was_set_makes_the_planner_think_again);
     RUN_TEST(test_who_has_time_waits_for_a_lower_price_and_gets_no_power_that_is_left_over);
+    RUN_TEST(test_by_the_papers_rule_a_plan_is_followed_step_by_step_until_a_vehicle_comes);
+    RUN_TEST(test_otherwise_a_plan_is_made_anew_in_every_step);
+    RUN_TEST(test_by_the_log_utility_nobody_gets_more_than_is_planned);
     return UNITY_END();
 }

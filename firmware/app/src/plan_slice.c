@@ -1,15 +1,24 @@
 /* The planner within the station: when to think, and for how long the result is good. */
 #include "station_internal.h"
 
-/** A plan is followed this many steps while its renewal is in work. One that could not be renewed ends at once. */
-#define PLAN_LASTS_STEPS 2u
+/** A plan is followed so much longer while its renewal is in work. One that could not be renewed ends at once. */
+#define SPARE_STEPS 1u
 /** After a plan that was no good, the next try. */
 #define RETRY_ms UINT32_C(60000)
 
-/** Events that make the planner think again; otherwise it does so once a step, and sooner after a failure. */
+/** Steps after which a plan is made anew if nothing happens. The paper's rule follows it until its last step. */
+static uint32_t renewed_after_steps(const taper_station_config_t *config) {
+    const uint8_t planned =
+        config->planning.horizon_steps > 0 ? config->planning.horizon_steps : config->steps;
+    return config->planning.on_events ? planned - 1U : 1U;
+}
+
+/** Events that make the planner think again; otherwise it does so after its time, and sooner after a failure. */
 static bool plan_is_due(const taper_station_t *station, int32_t site_limit_W) {
-    const uint32_t step_ms = station->options.config->step_s * UINT32_C(1000);
-    const uint32_t lasts_ms = station->plan_usable || step_ms < RETRY_ms ? step_ms : RETRY_ms;
+    const taper_station_config_t *config = station->options.config;
+    const uint32_t step_ms = config->step_s * UINT32_C(1000);
+    const uint32_t retry_ms = step_ms < RETRY_ms ? step_ms : RETRY_ms;
+    const uint32_t lasts_ms = station->plan_usable ? step_ms * renewed_after_steps(config) : retry_ms;
     return station->planner.verdict == TAPER_VERDICT_NONE || station->planned_limit_W != site_limit_W ||
            station->planned_revision != station->sessions.revision ||
            station->planned_curves != station->limits.revision ||
@@ -43,7 +52,7 @@ static void keep_prospect(taper_station_t *station, uint8_t i, bool usable) {
                                               .need_Wh = station->snapshot.demand[i].need_Wh};
 }
 
-/** Keep the first steps of a finished plan: the solver's memory is about to be used for the next one. */
+/** Keep a finished plan: the solver's memory is about to be used for the next one. */
 static void keep_plan(taper_station_t *station) {
     const bool usable = taper_planner_is_usable(station->planner.verdict);
     taper_station_count(station, TAPER_COUNTER_PLANS);
@@ -58,9 +67,8 @@ static void keep_plan(taper_station_t *station) {
     station->plan_usable = usable;
     station->plan_made_ms = station->planner.started_ms;
     for (uint8_t i = 0; i < station->snapshot.count; i++) {
-        for (uint8_t t = 0; t < TAPER_PLAN_STEPS; t++) {
-            const bool planned = usable && t < station->options.config->steps;
-            station->plan_W[t][i] = planned ? taper_planner_power_W(&station->planner, i, t) : 0;
+        for (uint8_t t = 0; t < station->options.config->steps; t++) {
+            station->plan_W[t][i] = usable ? taper_planner_power_W(&station->planner, i, t) : 0;
         }
         station->plan_session[i] = station->planner.session[i];
         station->plan_waits[i] = usable && station->planner.horizon.waits[i];
@@ -101,23 +109,39 @@ void taper_station_plan(taper_station_t *station, int32_t site_limit_W) {
 }
 
 bool taper_station_has_plan(const taper_station_t *station) {
-    const uint32_t lasts_ms = station->options.config->step_s * UINT32_C(1000) * PLAN_LASTS_STEPS;
+    const taper_station_config_t *config = station->options.config;
+    const uint32_t lasts_steps = renewed_after_steps(config) + SPARE_STEPS;
+    const uint32_t lasts_ms = config->step_s * UINT32_C(1000) * lasts_steps;
     return station->plan_usable &&
            taper_elapsed_ms(station->snapshot.now_ms, station->plan_made_ms) < lasts_ms;
+}
+
+/** The step of the plan that is followed now: the first, if it is renewed each step; by the paper's rule the present one. */
+static uint8_t followed_step(const taper_station_t *station) {
+    const taper_station_config_t *config = station->options.config;
+    const uint32_t age_ms = taper_elapsed_ms(station->snapshot.now_ms, station->plan_made_ms);
+    const uint32_t step = config->planning.on_events ? age_ms / (config->step_s * UINT32_C(1000)) : 0;
+    return (uint8_t)taper_min_i32((int32_t)step, config->steps);
+}
+
+int32_t taper_station_planned_W(const taper_station_t *station, uint8_t i, uint8_t ahead) {
+    const unsigned step = (unsigned)followed_step(station) + ahead;
+    return step < station->options.config->steps ? station->plan_W[step][i] : 0;
 }
 
 /**
  * The plan's first step is the wish; what is useful beyond it is the ceiling, so that what rounding, the solver's
  * tolerance or a falling taper leave over goes to whom the deadline presses most. Who waits for a lower price gets no more
- * than his wish. A vehicle that came after the plan was made has no wish yet, only a ceiling.
+ * than his wish, and so does everybody by the log utility: to spread energy is what it is for. A vehicle that came after the plan was made has no wish yet, only a ceiling.
  */
 void taper_station_propose_plan(taper_station_t *station) {
     taper_propose_edf(&station->snapshot, station->options.config->tick_ms, &station->proposal);
+    const bool is_exact = station->planner.horizon.log_utility;
     for (uint8_t i = 0; i < station->snapshot.count; i++) {
         const bool planned = station->plan_session[i] == station->snapshot.demand[i].session;
-        const int32_t plan_W = planned ? station->plan_W[0][i] : 0;
+        const int32_t plan_W = planned ? taper_station_planned_W(station, i, 0) : 0;
         station->proposal.wish_W[i] = taper_min_i32(plan_W, station->proposal.ceiling_W[i]);
-        if (planned && station->plan_waits[i]) {
+        if (planned && (station->plan_waits[i] || is_exact)) {
             station->proposal.ceiling_W[i] = station->proposal.wish_W[i];
         }
     }

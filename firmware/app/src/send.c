@@ -165,7 +165,7 @@ static void send_plan(taper_station_t *station, uint8_t i, uint32_t now_ms) {
     const bool planned =
         taper_station_has_plan(station) && demand->active && station->plan_session[i] == demand->session;
     for (uint8_t t = 0; t < TAPER_PLAN_STEPS; t++) {
-        message.as.plan.power_W[t] = planned ? station->plan_W[t][i] : TAPER_ABSENT;
+        message.as.plan.power_W[t] = planned ? taper_station_planned_W(station, i, t) : TAPER_ABSENT;
     }
     (void)taper_station_send_message(station, &message, &station->plan_counter[i], now_ms);
 }

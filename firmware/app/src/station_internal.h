@@ -91,6 +91,9 @@ void taper_station_plan(taper_station_t *station, int32_t site_limit_W);
 /** Whether there is a plan to follow now. */
 bool taper_station_has_plan(const taper_station_t *station);
 
+/** Power that the plan gives connector `i`, `ahead` steps from now [W]; 0 beyond its end. */
+int32_t taper_station_planned_W(const taper_station_t *station, uint8_t i, uint8_t ahead);
+
 /** The plan as a proposal. */
 void taper_station_propose_plan(taper_station_t *station);
 

@@ -2,15 +2,7 @@
 
 #include <string.h>
 
-/** Values being written one after the other. */
-typedef struct {
-    OSQPFloat *values;
-    OSQPInt room;
-    taper_written_t written;
-} writer_t;
-
-/** To the bit, so that a NaN that got in by accident counts as a change. */
-static void put(writer_t *writer, OSQPFloat value) {
+void taper_writer_put(taper_writer_t *writer, OSQPFloat value) {
     const OSQPInt at = writer->written.count++;
     if (at < writer->room && memcmp(&writer->values[at], &value, sizeof value) != 0) {
         writer->values[at] = value;
@@ -19,13 +11,13 @@ static void put(writer_t *writer, OSQPFloat value) {
 }
 
 taper_written_t taper_write_hessian(const taper_solver_t *solver) {
-    writer_t writer = {.values = solver->p_values, .room = solver->p_count};
+    taper_writer_t writer = {.values = solver->p_values, .room = solver->p_count};
     for (uint8_t i = 0; i < solver->connectors; i++) {
         for (uint8_t t = 0; t < solver->steps; t++) {
             if (t > 0) {
-                put(&writer, taper_horizon_hessian_neighbour(t));
+                taper_writer_put(&writer, taper_horizon_hessian_neighbour(t));
             }
-            put(&writer, taper_horizon_hessian_diagonal(solver->steps, t));
+            taper_writer_put(&writer, taper_horizon_hessian_diagonal(solver->steps, t));
         }
     }
     return writer.written;
@@ -44,35 +36,37 @@ static uint16_t weights_of(taper_real_t *weights, const taper_horizon_t *horizon
 }
 
 /** Column v(i,t) up to its sums. Its rows, ascending: rate t, rate t+1, taper t, taper t+1, target. */
-static void put_chain(writer_t *writer, uint8_t t, bool last_step, taper_real_t keep) {
-    put(writer, 1);
+static void put_chain(taper_writer_t *writer, const taper_horizon_t *horizon, uint8_t i, uint8_t t,
+                      bool last_step) {
+    taper_writer_put(writer, 1);
     if (!last_step) {
-        put(writer, -1);
+        taper_writer_put(writer, -1);
     }
     if (t > 0) {
-        put(writer, 1);
+        taper_writer_put(writer, horizon->taper_scale);
     }
-    put(writer, last_step ? TAPER_TARGET_SCALE : -keep);
+    taper_writer_put(writer,
+                     last_step ? horizon->target_scale : -horizon->taper_keep[i] * horizon->taper_scale);
 }
 
 /** Sum rows of one column: the weight in step t, minus it in step t+1. */
-static void put_sums(writer_t *writer, bool last_step, const taper_real_t *weights, uint16_t count) {
+static void put_sums(taper_writer_t *writer, bool last_step, const taper_real_t *weights, uint16_t count) {
     for (uint16_t k = 0; k < count; k++) {
-        put(writer, weights[k]);
+        taper_writer_put(writer, weights[k]);
         if (!last_step) {
-            put(writer, -weights[k]);
+            taper_writer_put(writer, -weights[k]);
         }
     }
 }
 
 taper_written_t taper_write_constraints(const taper_solver_t *solver, const taper_horizon_t *horizon) {
-    writer_t writer = {.values = solver->a_values, .room = solver->a_count};
+    taper_writer_t writer = {.values = solver->a_values, .room = solver->a_count};
     taper_real_t weights[TAPER_MAX_PLAN_ROWS];
     for (uint8_t i = 0; i < solver->connectors; i++) {
         const uint16_t count = weights_of(weights, horizon, i);
         for (uint8_t t = 0; t < solver->steps; t++) {
             const bool last_step = t + 1 == solver->steps;
-            put_chain(&writer, t, last_step, horizon->taper_keep[i]);
+            put_chain(&writer, horizon, i, t, last_step);
             put_sums(&writer, last_step, weights, count);
         }
     }

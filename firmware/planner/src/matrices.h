@@ -11,7 +11,17 @@ typedef struct {
     bool changed; /**< some value was not there already */
 } taper_written_t;
 
-/** Write the Hessian's values. */
+/** A matrix being written, one value after the other. */
+typedef struct {
+    OSQPFloat *values;
+    OSQPInt room;
+    taper_written_t written;
+} taper_writer_t;
+
+/** Write the next value. What was there is compared to the bit, so that a NaN that got in by accident counts as a change. */
+void taper_writer_put(taper_writer_t *writer, OSQPFloat value);
+
+/** Write the Hessian's values, of the throughput. */
 taper_written_t taper_write_hessian(const taper_solver_t *solver);
 
 /** Write the constraint matrix's values for `horizon`: its tapers and the weights of its sums. */

@@ -29,10 +29,10 @@ static taper_real_t allowed_power(const projection_t *projection, uint8_t i, uin
     taper_real_t allowed = horizon->upper[(size_t)i * steps + t];
     if (t > 0) {
         const taper_real_t slope = 1 - horizon->taper_keep[i];
-        allowed = taper_real_min(allowed,
-                                 projection->taper_upper[(size_t)i * (steps - 1U) + t - 1] - slope * charged);
+        const taper_real_t now = projection->taper_upper[(size_t)i * (steps - 1U) + t - 1];
+        allowed = taper_real_min(allowed, now / horizon->taper_scale - slope * charged);
     }
-    allowed = taper_real_min(allowed, projection->target_upper[i] / TAPER_TARGET_SCALE - charged);
+    allowed = taper_real_min(allowed, projection->target_upper[i] / horizon->target_scale - charged);
     return taper_real_max(allowed, 0);
 }
 

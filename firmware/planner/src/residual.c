@@ -30,11 +30,12 @@ static void count_chain(taper_residual_t *residual, const taper_horizon_t *horiz
     for (uint8_t t = 0; t < steps; t++) {
         count_row(residual, horizon, (size_t)i * steps + t, power_of(x, steps, i, t));
         if (t > 0) {
-            count_row(residual, horizon, taper_row + t - 1, chain[t] - horizon->taper_keep[i] * chain[t - 1]);
+            count_row(residual, horizon, taper_row + t - 1,
+                      horizon->taper_scale * (chain[t] - horizon->taper_keep[i] * chain[t - 1]));
         }
     }
     count_row(residual, horizon, taper_first_target_row(horizon->config) + i,
-              TAPER_TARGET_SCALE * chain[steps - 1]);
+              horizon->target_scale * chain[steps - 1]);
 }
 
 static void count_sum(taper_residual_t *residual, const taper_horizon_t *horizon, const OSQPFloat *x,

@@ -46,7 +46,7 @@ void taper_warm_start(taper_planner_t *planner, const taper_snapshot_t *snapshot
     const taper_station_config_t *config = planner->horizon.config;
     OSQPSolver *osqp = planner->solver->osqp;
     OSQPFloat growth = 1; /* the cost of a step is TAPER_DISCOUNT of the one before: so are the multipliers */
-    for (uint8_t k = 0; k < shift; k++) {
+    for (uint8_t k = 0; k < shift && !planner->horizon.log_utility; k++) {
         growth /= TAPER_DISCOUNT;
     }
     for (uint8_t i = 0; i < config->connector_count; i++) {

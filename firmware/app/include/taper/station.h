@@ -207,7 +207,7 @@ typedef struct {
     uint8_t emcy_counter[TAPER_MAX_BUSES];
     uint32_t second_ms; /**< when PLAN and CTRL_DIAG last went out */
     uint8_t next_plan, next_diag;
-    int32_t plan_W[TAPER_PLAN_STEPS][TAPER_MAX_CONNECTORS]; /**< first steps of the last finished plan */
+    int32_t plan_W[TAPER_MAX_STEPS][TAPER_MAX_CONNECTORS]; /**< the last finished plan */
     uint8_t plan_session[TAPER_MAX_CONNECTORS];             /**< whom it was made for */
     bool plan_waits[TAPER_MAX_CONNECTORS];                  /**< he waits for a lower price */
     uint32_t plan_made_ms;

@@ -13,6 +13,16 @@
  *     target    v(i,T-1) <= need
  *     sum       sum of c_ri u(i,t) over the connectors of row r <= P_r(t)  (paper, eq. 2)
  *
+ * With the log utility (config->planning) the cost is the paper's (eq. 4 and 7), lambda per squared energy missing:
+ *
+ *     minimise  - sum_i sum_t log u(i,t) + lambda sum_i (need_i - v(i,T-1))^2
+ *
+ * over the (i,t) in which the rate limit is above TAPER_LEAST_POWER; the others are 0. Its rate limits are also bounded by
+ * the limit at the present SOC, which says nothing new. The planner makes quadratic programmes of it (planner/src/utility.h)
+ * and writes their linear cost.
+ *
+ * With fewer planned steps than the station has, the rate limits of the others are 0.
+ *
  * s_i is the stay in steps, each counted by its share of the greatest limit of the course, and whole beyond the horizon.
  * Laxity is s_i less the steps that the need takes at the present limit, at least 0; m_i, where that is more than s_i, is
  * the fourth root of their ratio, else 1. A price counts if the course is priced, with `price_weight_permille`, and less
@@ -44,8 +54,13 @@
 #define TAPER_DISCOUNT ((taper_real_t)0.95)
 /** Curvature of the cost of power: small, for a unique answer that shares between equals. */
 #define TAPER_CURVATURE ((taper_real_t)0.1)
-/** Factor of the target rows. */
-#define TAPER_TARGET_SCALE ((taper_real_t)0.58)
+/** With the log utility: least rate limit that a power is planned for, per unit. */
+#define TAPER_LEAST_POWER ((taper_real_t)1e-3)
+/** Factors of the taper and target rows, by objective. */
+#define TAPER_TAPER_SCALE      ((taper_real_t)1)
+#define TAPER_TARGET_SCALE     ((taper_real_t)0.58)
+#define TAPER_LOG_TAPER_SCALE  ((taper_real_t)2)
+#define TAPER_LOG_TARGET_SCALE ((taper_real_t)1)
 /** Factor of the rows of currents besides: there are several for one of power, which bind together. */
 #define TAPER_CURRENT_SCALE ((taper_real_t)0.4)
 
@@ -61,8 +76,13 @@ typedef struct {
 
 typedef struct {
     const taper_station_config_t *config;
-    taper_real_t base_W;                      /**< power unit */
-    taper_real_t linear[TAPER_MAX_VARIABLES]; /**< linear cost */
+    taper_real_t base_W; /**< power unit */
+    taper_real_t
+        unit[TAPER_MAX_CONNECTORS]; /**< of a connector's powers and energies, on top of base_W: 1 as built */
+    taper_real_t taper_scale, target_scale;   /**< factors of these rows */
+    bool log_utility;                         /**< objective of the paper, else throughput */
+    taper_real_t missing_weight;              /**< lambda, of the log utility */
+    taper_real_t linear[TAPER_MAX_VARIABLES]; /**< linear cost; of the log utility the planner's to write */
     taper_real_t lower[TAPER_MAX_ROWS];       /**< row bounds; +-TAPER_REAL_UNBOUNDED: none */
     taper_real_t upper[TAPER_MAX_ROWS];
     taper_real_t taper_keep[TAPER_MAX_CONNECTORS]; /**< 1 - a_i: taper row (i,t) is v(i,t) - keep v(i,t-1) */

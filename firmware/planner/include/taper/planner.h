@@ -16,7 +16,7 @@
 /** A generated solver (`taper/solvers.h`). */
 typedef struct taper_solver taper_solver_t;
 
-/** Iterations after which a problem that has not converged is given up. */
+/** Iterations after which a quadratic programme that has not converged is given up. The log utility makes several. */
 #define TAPER_MAX_ITERATIONS 500
 /**
  * The planner looks for convergence every so many iterations. Longer slices are whole multiples of this. Shorter ones are for
@@ -44,6 +44,7 @@ typedef enum {
     TAPER_WORK_VECTORS,  /**< cost, bounds and starting point */
     TAPER_WORK_ITERATIONS,
     TAPER_WORK_PENALTY, /**< another penalty */
+    TAPER_WORK_EXPAND,  /**< the next quadratic programme of the log utility; no factorisation */
 } taper_work_t;
 
 typedef struct {
@@ -51,11 +52,16 @@ typedef struct {
     taper_horizon_t horizon; /**< the problem being solved */
     taper_verdict_t verdict;
     taper_work_t next;
-    uint16_t iterations;                   /**< spent on the present problem */
+    uint16_t iterations;                   /**< spent on the present quadratic programme */
+    uint16_t earlier;                      /**< spent on those before it, of the same problem */
+    uint8_t outer;                         /**< how many these are: log utility only */
     uint16_t slices;                       /**< of the present problem */
     uint32_t started_ms;                   /**< time of the snapshot that the problem is for */
     uint8_t session[TAPER_MAX_CONNECTORS]; /**< whose trajectory the warm start holds; 0: nobody's */
-    bool matrix_is_current;                /**< the solver's factorisation is that of its matrices' values */
+    taper_real_t
+        rate[TAPER_MAX_VARIABLES]; /**< log utility: rate limits, without those of the next step's length */
+    taper_real_t cost_scale;       /**< log utility: factor of the whole cost */
+    bool matrix_is_current;        /**< the solver's factorisation is that of its matrices' values */
 } taper_planner_t;
 
 /**
@@ -67,7 +73,8 @@ taper_status_t taper_planner_init(taper_planner_t *planner, const taper_solver_t
                                   const taper_station_config_t *config);
 
 /**
- * State a new problem. The last usable answer, moved on in time, is the starting point; after a problem that was dropped
+ * State a new problem. With the log utility it is a sequence of quadratic programmes, each around the answer of the last; their
+ * number is fixed (taper_planning_t). If one after the first has no usable answer, the last one's is the plan, INACCURATE. The last usable answer, moved on in time, is the starting point; after a problem that was dropped
  * or had no usable answer, the solver starts from nothing. The solver does not know of it before the next slice.
  * `course` as in taper_horizon_build(). Cost: that of taper_horizon_build(), and O(entries of the matrices).
  */
