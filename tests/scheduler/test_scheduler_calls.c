@@ -38,6 +38,38 @@ static void test_a_library_without_planner_says_so(void) {
     TEST_ASSERT_EQUAL_INT32(plans, account.iterations > 0);
 }
 
+/** Greatest less least current of the four connectors of feeder A, with room for 40 A. */
+static double spread_A(int32_t objective) {
+    const taper_scheduler_group_t few = {.line_A = 40};
+    taper_scheduler_options_t options;
+    taper_scheduler_defaults(&options);
+    options.objective = objective;
+    options.lambda_per_kWh2 = 0.01;
+    TEST_ASSERT_EQUAL_INT32(TAPER_SCHEDULER_OK, taper_scheduler_open(&scheduler, "hub", &options));
+    taper_scheduler_set_group(scheduler, 1, &few);
+    for (int32_t i = 0; i < 4; i++) {
+        const taper_scheduler_vehicle_t vehicle = vehicle_that_wants(25, HOUR_s * (1 + i));
+        plug_in(i, &vehicle);
+    }
+    plan_at(0);
+    double least_A = currents[0].current_A, most_A = least_A;
+    for (int i = 1; i < 4; i++) {
+        least_A = fmin(least_A, currents[i].current_A);
+        most_A = fmax(most_A, currents[i].current_A);
+    }
+    taper_scheduler_close(scheduler);
+    scheduler = NULL;
+    return most_A - least_A;
+}
+
+static void test_the_log_utility_shares_more_evenly(void) {
+    if (best_policy() == TAPER_SCHEDULER_SOC_MPC) {
+        TEST_ASSERT_TRUE(spread_A(1) + 5 < spread_A(0));
+    } else { /* EDF has no objective */
+        TEST_ASSERT_EQUAL_DOUBLE(spread_A(0), spread_A(1));
+    }
+}
+
 static void test_the_same_calls_give_the_same_currents(void) {
     taper_scheduler_current_t first[MOST_CONNECTORS];
     for (int run = 0; run < 2; run++) {
@@ -171,6 +203,7 @@ int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_a_station_is_opened_once);
     RUN_TEST(test_a_library_without_planner_says_so);
+    RUN_TEST(test_the_log_utility_shares_more_evenly);
     RUN_TEST(test_the_same_calls_give_the_same_currents);
     RUN_TEST(test_options_out_of_range_are_refused);
     RUN_TEST(test_a_vehicle_out_of_range_is_refused_and_the_last_one_kept);

@@ -40,11 +40,14 @@ static int32_t planned_W(const taper_scheduler_t *scheduler, uint8_t i) {
     return taper_saturate_i32(stay_s < step_s ? plan_W * step_s / stay_s : plan_W);
 }
 
-/** The first step is the wish, what is useful beyond it the ceiling, as in the firmware's station. */
+/** The first step is the wish, what is useful beyond it the ceiling; by the log utility nobody gets more than planned. As in
+    the firmware's station. */
 static void follow_plan(taper_scheduler_t *scheduler) {
     taper_proposal_t *proposal = &scheduler->proposal;
+    const bool is_exact = scheduler->planner.horizon.log_utility;
     for (uint8_t i = 0; i < scheduler->snapshot.count; i++) {
         proposal->wish_W[i] = taper_min_i32(planned_W(scheduler, i), proposal->ceiling_W[i]);
+        proposal->ceiling_W[i] = is_exact ? proposal->wish_W[i] : proposal->ceiling_W[i];
     }
 }
 
