@@ -75,8 +75,8 @@ def test_both_networks_end_in_every_direction_at_the_same_currents(network, calt
         assert np.abs(theirs - _limit_of(direction, ours)) * direction.sum() < NEAR_A, (trial, weights)
 
 
-@pytest.mark.parametrize("more", [["--evse", "continuous", "--algorithms", "edf,llf"], ["--evse", "real", "--algorithms", "llf"]],
-                         ids=["continuous", "real"])
+@pytest.mark.parametrize("more", [["--algorithms", "edf,llf"], ["--evse", "real", "--no-soc", "--algorithms", "llf"]],
+                         ids=["any current", "steps, and no SOC told"])
 def test_a_generated_day_breaks_nothing_and_delivers_no_less_than_the_best(more, tmp_path):
     assert acnsim.main([*SHORT_DAY, *more, "--out", str(tmp_path / "day.json")]) == 0
     taper, _, *others = json.loads((tmp_path / "day.json").read_text())["days"][0]["outcomes"]

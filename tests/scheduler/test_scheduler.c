@@ -176,6 +176,22 @@ static void test_an_evse_gets_only_currents_that_it_can_give(void) {
     TEST_ASSERT_TRUE(sum_A() >= 152); /* of 160 A, and of steps of 8 A */
 }
 
+static void test_a_vehicle_between_two_rates_is_offered_the_higher(void) {
+    const double rates_A[] = {0, 8, 16, 24, 32};
+    taper_scheduler_vehicle_t vehicle = vehicle_that_wants(20, 2 * HOUR_s);
+    open_with("hub", best_policy());
+    taper_scheduler_set_rates(scheduler, 0, rates_A, 5, 0);
+    plug_in(0, &vehicle);
+    vehicle.max_kW = 2; /* 2.9 A: less than any connector can give */
+    plug_in(1, &vehicle);
+    vehicle.max_A = 10;
+    plug_in(2, &vehicle);
+    plan_at(0);
+    TEST_ASSERT_EQUAL_DOUBLE(32, currents[0].current_A); /* it takes 31.9 A of that */
+    TEST_ASSERT_EQUAL_DOUBLE(6, currents[1].current_A);
+    TEST_ASSERT_EQUAL_DOUBLE(6, currents[2].current_A);
+}
+
 static void test_what_rounding_leaves_over_goes_to_the_most_urgent(void) {
     const double rates_A[] = {0, 10, 20, 30};
     const taper_scheduler_group_t few = {.line_A = 50};
@@ -218,6 +234,7 @@ int main(void) {
     RUN_TEST(test_a_nearly_full_battery_is_given_what_its_line_says);
     RUN_TEST(test_nobody_is_given_more_than_he_wants);
     RUN_TEST(test_an_evse_gets_only_currents_that_it_can_give);
+    RUN_TEST(test_a_vehicle_between_two_rates_is_offered_the_higher);
     RUN_TEST(test_what_rounding_leaves_over_goes_to_the_most_urgent);
     RUN_TEST(test_who_finds_no_place_waits);
     return UNITY_END();

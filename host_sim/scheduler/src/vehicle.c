@@ -41,8 +41,20 @@ static int32_t W_per_A(const taper_connector_config_t *connector) {
     return connector->voltage_mV / 1000 * connector->phases;
 }
 
-/** Most current, rounded up to the step of setpoints: a vehicle takes what it can, whatever it is offered. */
-static int32_t most_mA(const taper_connector_config_t *connector, const taper_scheduler_vehicle_t *vehicle) {
+/** The least current of connector `i` that is at least `wanted_mA`, or its greatest. */
+static int32_t rate_above_mA(const taper_scheduler_t *scheduler, uint8_t i, int32_t wanted_mA) {
+    const taper_connector_config_t *connector = &scheduler->connector[i];
+    if (scheduler->rates[i].count == 0) {
+        return taper_clamp_i32(wanted_mA, connector->min_mA, connector->max_mA);
+    }
+    const int32_t rate_mA = scheduler_next_mA(scheduler, i, wanted_mA - 1);
+    return rate_mA > 0 ? rate_mA : connector->max_mA;
+}
+
+/** Most current that is of use, rounded up to one that can be given: a vehicle takes what it can, whatever it is offered. */
+static int32_t most_mA(const taper_scheduler_t *scheduler, uint8_t i) {
+    const taper_connector_config_t *connector = &scheduler->connector[i];
+    const taper_scheduler_vehicle_t *vehicle = &scheduler->vehicle[i];
     double most_A = connector->max_mA / 1000.0;
     if (vehicle->max_A > 0) {
         most_A = fmin(most_A, vehicle->max_A);
@@ -50,8 +62,7 @@ static int32_t most_mA(const taper_connector_config_t *connector, const taper_sc
     if (vehicle->max_kW > 0) {
         most_A = fmin(most_A, vehicle->max_kW * 1000 / W_per_A(connector));
     }
-    const int32_t most = up(most_A * 1000 / TAPER_CURRENT_STEP_mA) * TAPER_CURRENT_STEP_mA;
-    return taper_min_i32(most, connector->max_mA);
+    return rate_above_mA(scheduler, i, up(most_A * 1000 / TAPER_CURRENT_STEP_mA) * TAPER_CURRENT_STEP_mA);
 }
 
 static int32_t departs_in_s(const taper_scheduler_vehicle_t *vehicle, double now_s) {
@@ -75,13 +86,16 @@ static taper_demand_t demand_of(const taper_scheduler_t *scheduler, uint8_t i, d
         .session = scheduler->number[i],
         .conductors = connector->phases,
         .need_Wh = up(vehicle->need_kWh * 1000),
-        .max_mA = most_mA(connector, vehicle),
+        .max_mA = most_mA(scheduler, i),
         .min_mA = connector->min_mA,
         .W_per_A = W_per_A(connector),
         .departs_in_s = departs_in_s(vehicle, now_s),
         .booking = taper_booking_nominal(&scheduler->config, i),
     };
     demand.peak_W = taper_demand_allowed_W(&demand);
+    if (vehicle->max_kW > 0) {
+        demand.peak_W = taper_min_i32(demand.peak_W, up(vehicle->max_kW * 1000));
+    }
     return demand;
 }
 
