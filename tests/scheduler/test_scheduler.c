@@ -192,6 +192,43 @@ static void test_a_vehicle_between_two_rates_is_offered_the_higher(void) {
     TEST_ASSERT_EQUAL_DOUBLE(6, currents[2].current_A);
 }
 
+/** Current of a vehicle alone that wants 20 A for a period, where a line has room for `line_A`. */
+static double current_within_A(double line_A) {
+    const taper_scheduler_vehicle_t vehicle = vehicle_that_wants(20 * 690 / 12000.0, 2 * HOUR_s);
+    const taper_scheduler_group_t few = {.line_A = line_A};
+    open_with("hub", TAPER_SCHEDULER_EDF_SOC);
+    taper_scheduler_set_group(scheduler, 1, &few);
+    plug_in(0, &vehicle);
+    plan_at(0);
+    tearDown();
+    return currents[0].current_A;
+}
+
+static void test_no_rest_is_left_that_is_less_than_the_least_current(void) {
+    TEST_ASSERT_EQUAL_DOUBLE(20, current_within_A(96));
+    TEST_ASSERT_EQUAL_DOUBLE(14, current_within_A(16)); /* the rest of 4 A could not be charged */
+    TEST_ASSERT_EQUAL_DOUBLE(12, current_within_A(12));
+}
+
+static void test_a_rate_is_the_nearest_to_the_wish_where_there_is_room(void) {
+    const double rates_A[] = {0, 8, 16, 24, 32};
+    const taper_scheduler_group_t few = {.line_A = 24};
+    taper_scheduler_vehicle_t slow = vehicle_that_wants(20, 2 * HOUR_s), fast = slow;
+    open_with("hub", TAPER_SCHEDULER_EDF_SOC);
+    taper_scheduler_set_group(scheduler, 1, &few);
+    slow.peak_kW = 21.8; /* 10.9 kW at half charge: 15.8 A */
+    slow.taper_kW = 21.8;
+    for (int32_t i = 0; i < 2; i++) {
+        taper_scheduler_set_rates(scheduler, i, rates_A, 5, 0);
+    }
+    fast.departs_s = 3 * HOUR_s;
+    plug_in(0, &slow);
+    plug_in(1, &fast);
+    plan_at(0);
+    TEST_ASSERT_EQUAL_DOUBLE(16, currents[0].current_A);
+    TEST_ASSERT_EQUAL_DOUBLE(8, currents[1].current_A);
+}
+
 static void test_what_rounding_leaves_over_goes_to_the_most_urgent(void) {
     const double rates_A[] = {0, 10, 20, 30};
     const taper_scheduler_group_t few = {.line_A = 50};
@@ -235,6 +272,8 @@ int main(void) {
     RUN_TEST(test_nobody_is_given_more_than_he_wants);
     RUN_TEST(test_an_evse_gets_only_currents_that_it_can_give);
     RUN_TEST(test_a_vehicle_between_two_rates_is_offered_the_higher);
+    RUN_TEST(test_no_rest_is_left_that_is_less_than_the_least_current);
+    RUN_TEST(test_a_rate_is_the_nearest_to_the_wish_where_there_is_room);
     RUN_TEST(test_what_rounding_leaves_over_goes_to_the_most_urgent);
     RUN_TEST(test_who_finds_no_place_waits);
     return UNITY_END();

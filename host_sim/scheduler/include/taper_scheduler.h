@@ -11,7 +11,8 @@
  * each connector may still draw, ramps and reaction times, the mode machine. `taper-sim` has them. Two steps are added,
  * for what other simulators have and the firmware has not:
  *
- *   rates   An EVSE that knows only some currents gets the next lower one of them.
+ *   rates   An EVSE that knows only some currents gets the next lower one of them, then the nearest to what was wished if there
+ *           is room. Of two ways to charge what is left, it takes the one that leaves no rest below its least current.
  *   fill    What rounding leaves over, and what the allocator's rows (linear, they bound the length of a sum of phasors from
  *           above, by up to 15 %) do not use, goes to the most urgent first: each current rises as far as the guard lets
  *           it pass, which adds phasors exactly. A rise has to hold the limits however little of its current any pair of lines
@@ -129,7 +130,7 @@ typedef struct {
     int32_t planned;    /**< 1: by the plan; 0: by EDF, as told, or for want of a good plan */
     int32_t verdict;    /**< taper_verdict_t of the solver: 2 solved, 3 inaccurate but usable; 0 with EDF */
     int32_t iterations; /**< of the solver */
-    int32_t lowered;    /**< answers so far that the guard refused at first: 0, but for a mistake */
+    int32_t lowered;    /**< answers that the guard refused at first: 0, but where rates meet imbalance */
 } taper_scheduler_account_t;
 
 typedef struct taper_scheduler taper_scheduler_t;

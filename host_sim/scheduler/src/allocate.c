@@ -112,6 +112,17 @@ static int32_t rounded_up_mA(const taper_scheduler_t *scheduler, uint8_t i) {
     return is_charged_by_then || is_enough || next_mA > demand->max_mA ? below_mA : next_mA;
 }
 
+/** The wish, rounded to the nearest rate that is not more than the vehicle takes or wants. */
+static int32_t nearest_to_wish_mA(const taper_scheduler_t *scheduler, uint8_t i) {
+    const taper_demand_t *demand = &scheduler->snapshot.demand[i];
+    const int64_t wish_mW = (int64_t)scheduler->proposal.wish_W[i] * 1000;
+    const int32_t wish_mA = taper_min_i32(taper_saturate_i32(wish_mW / demand->W_per_A), demand->max_mA);
+    const int32_t below_mA = rate_below_mA(scheduler, i, wish_mA);
+    const int32_t next_mA = scheduler_next_mA(scheduler, i, below_mA);
+    const bool is_nearer = next_mA - wish_mA <= wish_mA - below_mA && next_mA <= rounded_up_mA(scheduler, i);
+    return is_nearer ? next_mA : below_mA;
+}
+
 /** One pass by urgency. Who is off for want of a place keeps waiting for his turn. */
 static void fill(const taper_scheduler_t *scheduler, taper_setpoints_t *setpoints,
                  int32_t (*most_mA)(const taper_scheduler_t *, uint8_t)) {
@@ -120,6 +131,33 @@ static void fill(const taper_scheduler_t *scheduler, taper_setpoints_t *setpoint
         const taper_demand_t *demand = &scheduler->snapshot.demand[i];
         if (demand->active && (demand->min_mA == 0 || setpoints->current_mA[i] > 0)) {
             raise(scheduler, i, most_mA(scheduler, i), setpoints);
+        }
+    }
+}
+
+/**
+ * The current with which a vehicle ends the period so that it still wants what the least current gives in the next, if with
+ * `current_mA` it would want less than that, and never get it; else `current_mA`.
+ */
+static int32_t with_a_useful_rest_mA(const taper_scheduler_t *scheduler, uint8_t i, int32_t current_mA) {
+    const taper_demand_t *demand = &scheduler->snapshot.demand[i];
+    const int64_t takes_mW = (int64_t)taper_battery_limit_W(demand) * 1000;
+    const int64_t given_mW = (int64_t)current_mA * demand->W_per_A;
+    const int64_t least_mW = (int64_t)demand->min_mA * demand->W_per_A;
+    const int64_t need_mW = (int64_t)demand->need_Wh * 3600000 / scheduler->options.period_s;
+    const int64_t rest_mW = need_mW - given_mW;
+    const bool leaves = demand->departs_in_s <= scheduler->options.period_s;
+    if (leaves || takes_mW < given_mW || rest_mW <= 0 || rest_mW >= least_mW || need_mW < 2 * least_mW) {
+        return current_mA;
+    }
+    return rate_below_mA(scheduler, i, (int32_t)((need_mW - least_mW) / demand->W_per_A));
+}
+
+/** Nothing is raised, so what held however drawn still does. */
+static void keep_rests_useful(const taper_scheduler_t *scheduler, taper_setpoints_t *setpoints) {
+    for (uint8_t i = 0; i < scheduler->snapshot.count; i++) {
+        if (setpoints->current_mA[i] > 0 && scheduler->snapshot.demand[i].min_mA > 0) {
+            setpoints->current_mA[i] = with_a_useful_rest_mA(scheduler, i, setpoints->current_mA[i]);
         }
     }
 }
@@ -150,8 +188,10 @@ void scheduler_allocate(taper_scheduler_t *scheduler) {
                    &scheduler->rows, NULL, setpoints);
     round_down(scheduler, setpoints);
     if (scheduler->options.fill != 0 && scheduler_guard_passes(scheduler, setpoints)) {
+        fill(scheduler, setpoints, nearest_to_wish_mA);
         fill(scheduler, setpoints, ceiling_mA);
         fill(scheduler, setpoints, rounded_up_mA);
+        keep_rests_useful(scheduler, setpoints);
     }
     if (!scheduler_guard_passes(scheduler, setpoints)) {
         scheduler->account.lowered++;
