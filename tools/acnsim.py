@@ -17,6 +17,7 @@ import json
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
+from datetime import datetime
 from pathlib import Path
 
 from rich.console import Console
@@ -51,6 +52,10 @@ def sorted_algorithms(names: Sequence[str]) -> dict[str, Make]:
     return made
 
 
+def _period(time: datetime, midnight: datetime) -> int:
+    return int((time - midnight).total_seconds() // (60 * PERIOD_MIN))
+
+
 def recorded_week(path: Path, stations: Sequence[str], seed: int) -> list[Stay]:
     """
     A CSV of ACN-Data, each session at its own socket, wanting what it was delivered. Batteries are drawn as by
@@ -63,9 +68,8 @@ def recorded_week(path: Path, stations: Sequence[str], seed: int) -> list[Stay]:
     for row in rows:
         if row.station_id not in stations:
             raise InputError(f"{path}: session {row.session_id}: '{row.station_id}' is none of the network's stations")
-        arrival, departure = (int((time - midnight).total_seconds() // (60 * PERIOD_MIN)) for time in (row.arrival, row.departure))
-        arrival = max(arrival, free_from.get(row.station_id, 0))
-        departure = max(departure, arrival + 1)
+        arrival = max(_period(row.arrival, midnight), free_from.get(row.station_id, 0))
+        departure = max(_period(row.departure, midnight), arrival + 1)
         free_from[row.station_id] = departure
         battery = draw_battery(row.session_id, row.request_kwh, seed)
         stays.append(Stay(row.session_id, row.station_id, arrival, departure, row.request_kwh, battery.kwh,
@@ -118,7 +122,8 @@ def verdict(outcomes: Sequence[Outcome], names: Sequence[str]) -> list[str]:
         wrong.append(f"{taper.name} violates constraints in {taper.of_pilots.periods} periods by its pilots and in "
                      f"{taper.of_rates.periods} by what was drawn")
     if taper.delivered_kwh < best.delivered_kwh - world.FULL_KWH * taper.sessions:
-        wrong.append(f"{taper.name} delivers {taper.delivered_kwh:.2f} kWh, less than {best.name} with {best.delivered_kwh:.2f}")
+        wrong.append(f"{taper.name} delivers {taper.delivered_kwh:.2f} kWh, "
+                     f"less than {best.name} with {best.delivered_kwh:.2f}")
     return wrong
 
 
@@ -146,11 +151,13 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--seed", type=int, default=1, help="of the day, or of the week's batteries (default 1)")
     parser.add_argument("--seeds", type=whole_positive, default=1, help="so many days, with seeds from --seed on (default 1)")
     parser.add_argument("--cars", type=whole_positive, default=110, help="that come in the generated day (default 110)")
-    parser.add_argument("--week", type=Path, help="CSV of ACN-Data at Caltech instead, such as host_sim/data/acn-caltech-2019-07-14.csv")
+    parser.add_argument("--week", type=Path,
+                        help="CSV of ACN-Data at Caltech instead, such as host_sim/data/acn-caltech-2019-07-14.csv")
     parser.add_argument("--until-hour", type=positive, help="end then, counted from the first midnight (default: all have left)")
     parser.add_argument("--transformer-kw", type=positive, default=150.0, help="capacity of the transformer (default 150)")
     parser.add_argument("--evse", choices=("continuous", "real"), default="continuous",
-                        help="pilots of any current, or the steps of the garage's AeroVironment and ClipperCreek EVSEs (default continuous)")
+                        help="pilots of any current, or the steps of the garage's AeroVironment and ClipperCreek EVSEs "
+                             "(default continuous)")
     parser.add_argument("--no-soc", dest="soc", action="store_false",
                         help="Taper is told request and departure alone, as the sorted algorithms are")
     parser.add_argument("--no-fill", dest="fill", action="store_false",
@@ -158,7 +165,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--algorithms", type=lambda text: text.split(","), default=[*SORTS, "round-robin"],
                         help=f"acnportal's, with commas between (default {','.join([*SORTS, 'round-robin'])})")
     parser.add_argument("--uncontrolled", action="store_true", help="and charging without any control, for scale")
-    parser.add_argument("--library", type=Path, default=DEFAULT_LIBRARY, help="libtaper_scheduler.so (default: that of host-release)")
+    parser.add_argument("--library", type=Path, default=DEFAULT_LIBRARY,
+                        help="libtaper_scheduler.so (default: that of host-release)")
     parser.add_argument("--out", type=Path, help="JSON to write: all that the tables say")
     return parser
 
@@ -176,7 +184,8 @@ def compare(options: argparse.Namespace, console: Console) -> list[str]:
     for seed in range(options.seed, options.seed + options.seeds):
         outcomes = outcomes_of(options, seed)
         what = options.week.name if options.week is not None else "generated day"
-        console.print(table_of(outcomes, f"{what}, seed {seed}, {options.evse} pilots, transformer of {options.transformer_kw:g} kW"))
+        title = f"{what}, seed {seed}, {options.evse} pilots, transformer of {options.transformer_kw:g} kW"
+        console.print(table_of(outcomes, title))
         wrong += [f"seed {seed}: {line}" for line in verdict(outcomes, options.algorithms)]
         days.append({"seed": seed, "outcomes": [asdict(one) for one in outcomes]})
     if options.out is not None:
