@@ -43,6 +43,7 @@ class AcnRow:
     departure: datetime
     estimated_departure: datetime
     request_kwh: float
+    station_id: str = ""  # of the dataset; tools/acnsim.py replays sessions where they took place
 
 
 @dataclass(frozen=True)
@@ -85,6 +86,7 @@ def _acn_row(row: dict[str, str | None], where: str, request_column: str) -> Acn
         departure=_time_at(row["departure"], f"{where}, column departure"),
         estimated_departure=_time_at(row["estimated_departure"], f"{where}, column estimated_departure"),
         request_kwh=number_at(row[request_column], f"{where}, column {request_column}"),
+        station_id=(row.get("station_id") or "").strip(),
     )
     if not acn.session_id:
         raise InputError(f"{where}, column session_id: is empty")

@@ -27,7 +27,8 @@ def tree(tmp_path):
     script = (ROOT / "tools" / "dev").read_text()
     assert begin in script
     program(tmp_path / "tools" / "dev", script.replace(begin, begin + "    return\n"))
-    shutil.copy(ROOT / "tools" / "requirements.txt", tmp_path / "tools")
+    for requirements in (ROOT / "tools").glob("requirements*.txt"):
+        shutil.copy(requirements, tmp_path / "tools")
     program(tmp_path / "tools" / "fetch_sources")
     program(tmp_path / "bin" / "cmake", '#!/bin/bash\necho "cmake version 3.25.1"\n')
     program(tmp_path / "bin" / "ctest", CTEST)

@@ -237,8 +237,8 @@ static void test_the_demand_gets_limit_and_slope_of_the_line(void) {
     taper_learn_apply(&trial.learn, energy_Wh, &unknown);
     TEST_ASSERT_INT32_WITHIN(70, (int32_t)limit_W(energy_Wh), taper_battery_limit_W(&known));
     TEST_ASSERT_INT32_WITHIN(70, (int32_t)limit_W(energy_Wh), taper_battery_limit_W(&unknown));
-    TEST_ASSERT_TRUE(fabs((double)taper_battery_slope_per_h(&known) - 0.15) < 0.005);
-    TEST_ASSERT_TRUE(fabs((double)taper_battery_slope_per_h(&unknown) - 0.15) < 0.005);
+    TEST_ASSERT_TRUE(fabs((double)taper_battery_slope_per_h(&known, 0) - 0.15) < 0.005);
+    TEST_ASSERT_TRUE(fabs((double)taper_battery_slope_per_h(&unknown, 0) - 0.15) < 0.005);
     TEST_ASSERT_EQUAL_INT32(25000, known.stored_Wh);
     TEST_ASSERT_EQUAL_INT32(60000, known.capacity_Wh);
 }
