@@ -1,6 +1,7 @@
 """Runs jobs on Dask: on processes of this machine, or on the workers of a cluster; or one by one without it."""
 
 import contextlib
+import logging
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -45,7 +46,7 @@ def _client(where: Where) -> Iterator:
     dask.config.set({"temporary_directory": str(where.scratch), "distributed.admin.tick.limit": "1h"})
     if where.scheduler is None:
         with LocalCluster(n_workers=where.workers, threads_per_worker=1, dashboard_address=":0",
-                          memory_limit=0) as cluster, Client(cluster) as client:
+                          memory_limit=0, silence_logs=logging.ERROR) as cluster, Client(cluster) as client:
             yield client
         return
     try:

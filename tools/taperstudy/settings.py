@@ -15,7 +15,7 @@ SYNTHETIC_KW = 56.0
 WEEK_SHARE = 0.35  # of the weeks with drawn batteries, as in tools/results.py
 CONTINUOUS = ("--min-current-a", "0")  # the paper knows no minimum current
 
-# The paper says neither how large the batteries of its real week are nor what its limit is. The data asks for 24 kWh per
+# The paper says neither how large the batteries of its real week are nor what its limit is. The data asks for 24.7 kWh per
 # session on average, so batteries are as large as they can be: with 7.2 kW, or 1.8 kWh a step, and the steepest taper of
 # 0.1, a battery of 18 kWh takes nothing more when it is full, and a larger one would never be.
 WEEK_BATTERY_KWH = 18.0
