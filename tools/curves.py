@@ -5,7 +5,7 @@ A vehicle tells a flat limit, the greatest power of its curve, and with 2 or 3 p
 state of charge; the least of them is what a station plans with.
 
   curves.py fits --out FILE            one row per vehicle, pieces and way of fitting, and a summary on the terminal
-  curves.py day --out FILE --pieces N  sessions of a day at a hub of DC chargers (tools/study/stations/dc_hub.toml)
+  curves.py day --out FILE --pieces N  sessions of a day at a hub of DC chargers (tools/taperstudy/stations/dc_hub.toml)
 
 taperlib/curves.py says how lines are fitted and what is drawn.
 """

@@ -13,6 +13,7 @@ from .simulator import Run
 COLOURS = {
     "soc-mpc": "#0072B2",
     "soc-mpc-log": "#1B4F72",
+    "soc-mpc-learned": "#882255",
     "mpc": "#56B4E9",
     "mpc-log": "#7FB3D5",
     "edf": "#E69F00",
@@ -52,7 +53,7 @@ def _times(time_s: np.ndarray) -> np.ndarray:
     return FIRST_DAY + np.round(time_s * 1000).astype("timedelta64[ms]")
 
 
-def _figure(height: int) -> go.Figure:
+def empty_figure(height: int) -> go.Figure:
     figure = go.Figure()
     font = {"family": "system-ui, -apple-system, Segoe UI, Helvetica, Arial, sans-serif", "size": 13, "color": INK}
     figure.update_layout(
@@ -66,7 +67,7 @@ def _figure(height: int) -> go.Figure:
 
 
 def site_power(runs: list[Run]) -> go.Figure:
-    figure = _figure(430)
+    figure = empty_figure(430)
     rows = _changes(runs[0].limit_kw)
     figure.add_trace(go.Scatter(
         x=_times(runs[0].time_s[rows]), y=runs[0].limit_kw[rows], name="limit", mode="lines",
@@ -89,7 +90,7 @@ def site_power(runs: list[Run]) -> go.Figure:
 
 
 def share_of_bound(table: list[Measures]) -> go.Figure:
-    figure = _figure(90 + 36 * len(table))
+    figure = empty_figure(90 + 36 * len(table))
     for row in table:
         figure.add_trace(go.Scatter(
             x=[row.share_of_bound_percent], y=[row.policy], mode="markers+text", showlegend=False,
@@ -106,7 +107,7 @@ def share_of_bound(table: list[Measures]) -> go.Figure:
 
 
 def satisfied(table: list[Measures]) -> go.Figure:
-    figure = _figure(90 + 36 * len(table))
+    figure = empty_figure(90 + 36 * len(table))
     figure.add_trace(go.Bar(
         x=[row.satisfied for row in table], y=[row.policy for row in table], orientation="h", width=0.6,
         marker={"color": [colour_of(row.policy) for row in table]},
@@ -119,7 +120,7 @@ def satisfied(table: list[Measures]) -> go.Figure:
 
 
 def missing_soc(sessions: list[Session], runs: list[Run]) -> go.Figure:
-    figure = _figure(380)
+    figure = empty_figure(380)
     for run in runs:
         missing = np.sort(missing_soc_percent(sessions, run))
         share_percent = 100 * np.arange(1, missing.size + 1) / missing.size
@@ -134,7 +135,7 @@ def missing_soc(sessions: list[Session], runs: list[Run]) -> go.Figure:
 
 
 def arrivals_per_hour(sessions: list[Session]) -> go.Figure:
-    figure = _figure(300)
+    figure = empty_figure(300)
     hour_of_day = (np.array([session.arrival_s for session in sessions]) // 3600 % 24).astype(int)
     figure.add_trace(go.Bar(
         x=np.arange(24) + 0.5, y=np.bincount(hour_of_day, minlength=24), width=0.9, marker={"color": "#8c959f"},
@@ -147,7 +148,7 @@ def arrivals_per_hour(sessions: list[Session]) -> go.Figure:
 
 
 def _spread_bars(runs: list[Run], title: str, spread_of: Callable) -> go.Figure:
-    figure = _figure(300)
+    figure = empty_figure(300)
     for run in runs:
         spread = spread_of(run)
         values = [spread.p50, spread.p99, spread.max]

@@ -15,6 +15,7 @@ from .files import InputError
 from .sessions import Session
 
 ROOT = Path(__file__).resolve().parents[2]
+STATION_FOLDERS = (ROOT / "codegen" / "stations", ROOT / "tools" / "taperstudy" / "stations")
 sys.path.append(str(ROOT / "codegen"))
 
 from rows import DIFFERENCES, POWER, planned_rows  # noqa: E402
@@ -34,7 +35,9 @@ class FeederRow:
 
 
 def station_file(name: str) -> Path:
-    return ROOT / "codegen" / "stations" / f"{name}.toml"
+    """Of codegen/stations, or of those that only the study uses; the former if there is none."""
+    files = [folder / f"{name}.toml" for folder in STATION_FOLDERS]
+    return next((file for file in files if file.is_file()), files[0])
 
 
 def _load(name: str) -> Station:
@@ -45,7 +48,7 @@ def _load(name: str) -> Station:
 
 
 def connector_count(name: str) -> int:
-    """Of a station of codegen/stations. Raises InputError."""
+    """Raises InputError."""
     return len(_load(name).connectors)
 
 

@@ -180,14 +180,18 @@ def _row_of_session(session: Session, optional: list[str]) -> list[str]:
     return row + ["" if value is None else _OPTIONAL[name](value) for name, value in values]
 
 
-def write_sessions_csv(path: Path, sessions: list[Session]) -> None:
+def sessions_csv(sessions: list[Session]) -> str:
     """Optional columns only where some session has a value."""
     optional = [name for name in _OPTIONAL if any(getattr(session, name) is not None for session in sessions)]
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow((*COLUMNS, *optional))
     writer.writerows(_row_of_session(session, optional) for session in sessions)
-    write_atomically(path, buffer.getvalue())
+    return buffer.getvalue()
+
+
+def write_sessions_csv(path: Path, sessions: list[Session]) -> None:
+    write_atomically(path, sessions_csv(sessions))
 
 
 def requested_kwh(sessions: list[Session]) -> float:
