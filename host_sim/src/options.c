@@ -134,7 +134,8 @@ static const struct argp_option options[] = {
      0},
     {"tick-s", KEY_TICK, "N", 0, "Control tick [s], 1..3600 (default: 60)", 0},
     {"iterations", KEY_ITERATIONS, "N", 0,
-     "Solver iterations in a tick, 1..500; fewer than 10 bound its work (default: 500 in ticks of 10 s or "
+     "Solver iterations in a tick, 1..500; fewer than 10 bound its work, 500 are a whole solve (default: 500 "
+     "in ticks of 10 s or "
      "more, else 50); in a replay, as "
      "taper-station was told",
      0},

@@ -276,6 +276,20 @@ static void test_by_the_log_utility_nobody_gets_more_than_is_planned(void) {
         7300, bench.station.target.current_mA[0]); /* up to the step, where it could take 11.6 A */
 }
 
+static void test_a_tick_with_room_for_a_whole_solve_ends_with_a_plan_by_log_utility_too(void) {
+    taper_station_config_t config;
+    const taper_planning_t planning = {.objective = TAPER_OBJECTIVE_LOG_UTILITY,
+                                       .lambda_milli_per_kWh2 = 1000000};
+    start_planning(&planning, &config);
+    bench_send_all(8, 30000);
+    for (uint8_t node = 1; node <= 8; node++) {
+        bench_send_vehicle(node, 7, 90 * node); /* uneven: many programmes, and more iterations each */
+    }
+    bench_step();
+    TEST_ASSERT_GREATER_THAN_UINT16(TAPER_MAX_ITERATIONS, taper_planner_iterations(&bench.station.planner));
+    TEST_ASSERT_EQUAL(TAPER_MODE_PLAN, taper_station_mode(&bench.station));
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_a_soc_frame_in_gives_a_setpoint_frame_out_through_every_hop);
@@ -290,5 +304,6 @@ int main(void) {
     RUN_TEST(test_by_the_papers_rule_a_plan_is_followed_step_by_step_until_a_vehicle_comes);
     RUN_TEST(test_otherwise_a_plan_is_made_anew_in_every_step);
     RUN_TEST(test_by_the_log_utility_nobody_gets_more_than_is_planned);
+    RUN_TEST(test_a_tick_with_room_for_a_whole_solve_ends_with_a_plan_by_log_utility_too);
     return UNITY_END();
 }

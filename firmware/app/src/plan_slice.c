@@ -86,6 +86,17 @@ static bool may_plan(taper_station_t *station) {
     return may;
 }
 
+/**
+ * A tick's work at a plan. One that has room for a whole solve has it for all quadratic programmes of a plan by log utility:
+ * where a tick stands for a planning step, a plan that is ready some ticks later is of no use.
+ */
+static void work(taper_station_t *station, uint16_t iterations) {
+    taper_verdict_t verdict = TAPER_VERDICT_NONE;
+    do {
+        verdict = taper_planner_run(&station->planner, iterations);
+    } while (iterations >= TAPER_MAX_ITERATIONS && verdict == TAPER_VERDICT_SOLVING);
+}
+
 void taper_station_plan(taper_station_t *station, int32_t site_limit_W) {
     if (station->options.solver == NULL || station->options.policy != NULL || !may_plan(station)) {
         return;
@@ -100,7 +111,7 @@ void taper_station_plan(taper_station_t *station, int32_t site_limit_W) {
         start_plan(station, site_limit_W);
     }
     if (!begins || iterations >= TAPER_MIN_SLICE) { /* where slices are short, to state a problem is one */
-        taper_planner_run(&station->planner, iterations);
+        work(station, iterations);
     }
     station->solve_us += clock_us(station) - began_us;
     if (station->planner.verdict != TAPER_VERDICT_SOLVING) {

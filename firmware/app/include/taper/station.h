@@ -55,7 +55,8 @@ typedef struct {
     const taper_solver_t *solver; /**< generated for this station; NULL: no planner, charge by fallback */
     const taper_policy_t *policy; /**< NULL: the planner */
     uint16_t iterations_per_tick; /**< solver iterations in a control tick, >= 1; fewer than TAPER_MIN_SLICE
-                                       bound the work of a tick: see taper_planner_run() */
+                                       bound the work of a tick: see taper_planner_run(). From TAPER_MAX_ITERATIONS on, a
+                                       tick works until its plan is ready: by log utility, many times as many */
     /** Simulation: so many times faster than the bus run batteries, departures, the wall clock and the planning steps,
         while periods and timeouts of the bus stay as they are. `tick_ms` of the configuration counts in their time.
         0 is 1, a real station. At most TAPER_MAX_TIME_SCALE, and `tick_ms`. */
