@@ -70,20 +70,23 @@ static void propose_equal_share(void *tick_ms, const taper_snapshot_t *snapshot,
 #define LOG_UTILITY TAPER_OBJECTIVE_LOG_UTILITY
 
 const sim_policy_t sim_policies[] = {
-    {"soc-mpc", "planner that knows the taper", true, NULL, THROUGHPUT, false, TAPER_DRIVE_PLANNER},
+    {"soc-mpc", "planner that knows the taper", true, NULL, THROUGHPUT, false, TAPER_DRIVE_PLANNER, false},
     {"soc-mpc-learned", "the same, with tapers that nobody tells: it learns them", false, NULL, THROUGHPUT,
-     true, -1},
-    {"mpc", "the same planner, without the taper", false, NULL, THROUGHPUT, false, TAPER_DRIVE_PLANNER},
-    {"soc-mpc-log", "planner of the paper, by log utility (eq. 7)", true, NULL, LOG_UTILITY, false, -1},
-    {"mpc-log", "the same, without the taper (eq. 4)", false, NULL, LOG_UTILITY, false, -1},
+     true, -1, false},
+    {"mpc", "the same planner, without the taper", false, NULL, THROUGHPUT, false, TAPER_DRIVE_PLANNER,
+     false},
+    {"soc-mpc-log", "planner of the paper, by log utility (eq. 7)", true, NULL, LOG_UTILITY, false, -1,
+     false},
+    {"mpc-log", "the same, without the taper (eq. 4) and without what vehicles were seen to take", false,
+     NULL, LOG_UTILITY, false, -1, true},
     {"edf", "earliest deadline first, without the taper", false, propose_edf, THROUGHPUT, false,
-     TAPER_DRIVE_EDF},
+     TAPER_DRIVE_EDF, false},
     {"edf-soc", "earliest deadline first, clamped to the taper", true, propose_edf, THROUGHPUT, false,
-     TAPER_DRIVE_EDF},
-    {"llf", "least laxity first, clamped to the taper", true, propose_llf, THROUGHPUT, false,
-     TAPER_DRIVE_LLF},
+     TAPER_DRIVE_EDF, false},
+    {"llf", "least laxity first, clamped to the taper", true, propose_llf, THROUGHPUT, false, TAPER_DRIVE_LLF,
+     false},
     {"equal-share", "equal parts of the site limit, without the taper", false, propose_equal_share,
-     THROUGHPUT, false, -1},
+     THROUGHPUT, false, -1, false},
 };
 const unsigned sim_policy_count = sizeof sim_policies / sizeof sim_policies[0];
 

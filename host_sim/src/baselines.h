@@ -17,6 +17,7 @@ typedef struct {
     taper_objective_t objective; /**< of the planner */
     bool learns;                 /**< the station learns tapers from what vehicles accept */
     int on_board;                /**< taper_drive_policy_t; negative: only this program has it */
+    bool ignores_draw;           /**< the station does not plan with what vehicles were seen to take */
 } sim_policy_t;
 
 extern const sim_policy_t sim_policies[];

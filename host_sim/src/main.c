@@ -31,6 +31,7 @@ typedef struct {
 static taper_planning_t planning_of(const sim_options_t *options, const taper_planning_t *own) {
     taper_planning_t planning = *own;
     planning.objective = (uint8_t)options->policy->objective;
+    planning.ignores_draw = options->policy->ignores_draw;
     planning.learns_taper = planning.learns_taper || options->learns || options->policy->learns;
     if (options->horizon_steps > 0) {
         planning.horizon_steps = (uint8_t)options->horizon_steps;

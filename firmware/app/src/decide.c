@@ -58,7 +58,7 @@ static void watch_draw(taper_station_t *station, uint8_t i, uint32_t now_ms) {
         const taper_connector_config_t *connector = &station->options.config->connectors[i];
         taper_alarm_raise(station, TAPER_EVENT_OVER_DRAW, connector->bus, connector->node, now_ms);
         *demand = (taper_demand_t){.booking = demand->booking}; /* what it draws still counts */
-    } else if (demand->active) {
+    } else if (demand->active && !station->options.config->planning.ignores_draw) {
         const int32_t most_mA = taper_learning_cap_mA(station, i, draw->cap_mA);
         const int32_t cap_mA = most_mA - most_mA % TAPER_CURRENT_STEP_mA;
         demand->max_mA = taper_min_i32(demand->max_mA, taper_max_i32(cap_mA, demand->min_mA));

@@ -142,8 +142,11 @@ typedef struct {
     bool
         on_events; /**< the paper's rule: plan anew only when a vehicle comes, leaves or reaches its target, or a limit
                             changes, and follow the plan in between */
-    uint8_t taper_lines; /**< of a vehicle that are planned with, 1 or 2; 0: 1. The solver is generated for as many */
-    bool learns_taper;             /**< from what vehicles accept; what they tell is a first guess */
+    uint8_t
+        taper_lines; /**< of a vehicle that are planned with, 1 or 2; 0: 1. The solver is generated for as many */
+    bool learns_taper; /**< from what vehicles accept; what they tell is a first guess */
+    bool
+        ignores_draw; /**< plans as if vehicles took all that they are offered, as the paper's SOC-blind planner does */
     int32_t lambda_milli_per_kWh2; /**< of the log utility: weight of the squared energy missing, >= 0 */
 } taper_planning_t;
 
@@ -194,15 +197,15 @@ static inline taper_supply_t taper_supply_of_W(int32_t site_W) {
 
 /** One vehicle's demand at the instant of a snapshot. Meaningless unless `active`, but for `booking`, which holds always. */
 typedef struct {
-    bool active;             /**< a vehicle is there, is sound, and still wants energy */
-    bool soc_estimated;      /**< `stored_Wh` rests on measured energy because the reported SOC is stale */
-    uint8_t session;         /**< wire number of the session on this connector */
-    uint8_t conductors;      /**< phases of the connector that the vehicle may use: 1..3 */
-    int32_t stored_Wh;       /**< energy in the battery, >= 0; 0 if SOC or capacity is unknown */
-    int32_t capacity_Wh;     /**< > 0, or 0: unknown (no taper then) */
-    int32_t need_Wh;         /**< energy still wanted, > 0 */
-    int32_t peak_W;          /**< line of the taper, at SOC 0, >= 0; may be above what `max_mA` allows */
-    int32_t taper_W;         /**< fall of that from SOC 0 to SOC 1, 0..peak_W; a learned one may reach 0 earlier */
+    bool active;         /**< a vehicle is there, is sound, and still wants energy */
+    bool soc_estimated;  /**< `stored_Wh` rests on measured energy because the reported SOC is stale */
+    uint8_t session;     /**< wire number of the session on this connector */
+    uint8_t conductors;  /**< phases of the connector that the vehicle may use: 1..3 */
+    int32_t stored_Wh;   /**< energy in the battery, >= 0; 0 if SOC or capacity is unknown */
+    int32_t capacity_Wh; /**< > 0, or 0: unknown (no taper then) */
+    int32_t need_Wh;     /**< energy still wanted, > 0 */
+    int32_t peak_W;      /**< line of the taper, at SOC 0, >= 0; may be above what `max_mA` allows */
+    int32_t taper_W; /**< fall of that from SOC 0 to SOC 1, 0..peak_W; a learned one may reach 0 earlier */
     int32_t second_peak_W;   /**< another such line, of which the lower one counts; 0: there is none */
     int32_t second_taper_W;  /**< 0..second_peak_W */
     int32_t max_mA;          /**< least of connector and vehicle limit, per phase */
