@@ -83,8 +83,13 @@ class LearningTopic(Topic):
 
     def outcome(self, results: Results) -> Outcome:
         told_right = [setting for setting in self.settings if "--taper-error" not in setting.options]
-        lost = max(_lost_percent(results, setting) for setting in told_right)
-        headlines = {"soc-mpc-learned, most lost against knowing the taper [%]": lost}
+        day = [setting for setting in told_right if setting.name.startswith("synthetic")]
+        week = [setting for setting in told_right if setting not in day]
+        headlines = {
+            f"soc-mpc-learned, most lost against knowing the taper, {name} [%]": max(
+                _lost_percent(results, setting) for setting in settings)
+            for name, settings in (("real week", week), ("synthetic day", day))
+        }
         return replace(super().outcome(results), headlines=headlines)
 
 
