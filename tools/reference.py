@@ -100,8 +100,8 @@ def _recorded(options: argparse.Namespace) -> list[Case]:
     horizon = [] if options.horizon_steps is None else ["--horizon-steps", str(options.horizon_steps)]
     with tempfile.TemporaryDirectory() as folder:
         problems = Path(folder) / "problems"
-        command = [str(options.sim), "--sessions", str(options.sessions), "--station", options.station, *limit, *horizon,
-                   "--policy", options.policy, "--lambda", f"{options.weight:g}", "--tick-s", f"{options.tick_s:g}",
+        command = [str(options.sim.absolute()), "--sessions", str(options.sessions), "--station", options.station, *limit,
+                   *horizon, "--policy", options.policy, "--lambda", f"{options.weight:g}", "--tick-s", f"{options.tick_s:g}",
                    "--problems", str(problems)]
         try:
             run = subprocess.run(command, capture_output=True, text=True, check=False)

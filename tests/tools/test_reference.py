@@ -14,7 +14,7 @@ import pytest
 import reference
 from taperlib.files import InputError
 from taperlib.log_utility import DOUBT, PRECISE, Exact, LogUtility
-from taperlib.planner_probe import demand_line
+from taperlib.planner_probe import demand_line, run_probe
 from taperlib.planning_cases import KINDS, LAMBDAS, STATIONS, Case, draw, evenly, read_problems
 from taperlib.planning_problem import Demand, read_station
 
@@ -176,6 +176,14 @@ SESSIONS = """session_id,connector,arrival_s,departure_s,battery_kwh,soc_arrival
 a,1,0,9000,40,0.2,0.8,22,10,
 b,2,1800,9000,40,0.2,0.8,22,10,1
 """
+
+
+def test_a_program_in_the_present_folder_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "probe").write_text("#!/bin/sh\nexit 3\n")
+    (tmp_path / "probe").chmod(0o755)
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match="exit code 3"):
+        run_probe(Path("./probe"), [], [])
 
 
 def run(tmp_path: Path, *arguments: str) -> int:

@@ -63,7 +63,7 @@ def _planned(lines: list[str], case: Case) -> Planned:
 def run_probe(probe: Path, lines: list[str], cases: list[Case]) -> list[Planned]:
     """What the firmware plans, one for every `solve` of the lines, which are for `cases`. Raises InputError."""
     try:
-        run = subprocess.run([str(probe)], input="\n".join([*lines, ""]), capture_output=True, text=True, check=False)
+        run = subprocess.run([str(probe.absolute())], input="\n".join([*lines, ""]), capture_output=True, text=True, check=False)
     except OSError as error:
         raise InputError(f"{probe}: cannot be started: {error.strerror}") from None
     if run.returncode != 0:

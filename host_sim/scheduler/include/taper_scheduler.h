@@ -24,7 +24,8 @@
  * (`codegen/stations/NAME.toml`); group 0 is the site. Times are seconds of the simulator's clock, on any origin.
  *
  * One instance of a station per process: the generated solver's memory is a global. Different stations can be open at the same
- * time. Calls are not safe from more than one thread at once. The same calls give the same currents, to the bit.
+ * time. No pointer may be NULL unless its call says so. Calls are not safe from more than one thread at once. The same calls
+ * give the same currents, to the bit.
  */
 #ifndef TAPER_SCHEDULER_H
 #define TAPER_SCHEDULER_H
