@@ -108,16 +108,6 @@ static void send_param_d(node_t *node, node_send_t send, void *context) {
     seal_and_send(node, &frame, send, context);
 }
 
-/** Absurd, or with a peak of 0: no second line. */
-static void send_param_e(node_t *node, node_send_t send, void *context) {
-    taper_frame_t frame = param(node, WIRE_EV_PARAM_E);
-    if (!node->absurd) {
-        wire_put(&frame, 16, 32, 0);
-    }
-    wire_put(&frame, 56, 8, node->session);
-    seal_and_send(node, &frame, send, context);
-}
-
 static void send_info(node_t *node, node_send_t send, void *context) {
     taper_frame_t frame = wire_frame(WIRE_EVSE_INFO, node->config->node);
     const unsigned kind = node->config->is_dc ? 3u : node->config->phases == 3 ? 2u : 1u;
@@ -148,6 +138,5 @@ void node_report(node_t *node, uint64_t tick, unsigned poll, node_send_t send, v
         send_param_b(node, send, context);
         send_param_c(node, send, context);
         send_param_d(node, send, context);
-        send_param_e(node, send, context);
     }
 }

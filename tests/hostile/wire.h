@@ -26,7 +26,6 @@ enum {
     WIRE_EV_PARAM_C = 12,
     WIRE_EVSE_INFO = 13,
     WIRE_EV_PARAM_D = 16,
-    WIRE_EV_PARAM_E = 18,
     WIRE_FUNCTIONS = 32,
 };
 
