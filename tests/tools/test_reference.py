@@ -12,8 +12,10 @@ import cvxpy as cp
 import numpy as np
 import pytest
 import reference
+from rich.console import Console
 from taperlib.files import InputError
-from taperlib.log_utility import DOUBT, PRECISE, Exact, LogUtility
+from taperlib.gaps import Solved
+from taperlib.log_utility import DOUBT, PRECISE, Exact, LogUtility, SolverError
 from taperlib.planner_probe import demand_line, run_probe
 from taperlib.planning_cases import KINDS, LAMBDAS, STATIONS, Case, draw, evenly, read_problems
 from taperlib.planning_problem import Demand, read_station
@@ -176,6 +178,24 @@ SESSIONS = """session_id,connector,arrival_s,departure_s,battery_kwh,soc_arrival
 a,1,0,9000,40,0.2,0.8,22,10,
 b,2,1800,9000,40,0.2,0.8,22,10,1
 """
+
+
+def test_a_problem_that_the_exact_solver_fails_on_is_told_and_left_out(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    cases = [draw(0), draw(1)]
+    solve = Solved.of
+
+    def fail_on_the_first(case: Case) -> Solved:
+        if case.name == cases[0].name:
+            raise SolverError("no progress")
+        return solve(case)
+
+    monkeypatch.setattr(reference.Solved, "of", staticmethod(fail_on_the_first))
+    assert [one.case.name for one in reference._solved(cases, Console(quiet=True))] == [cases[1].name]
+    assert f"{cases[0].name} is left out: no progress" in capsys.readouterr().err
+    with pytest.raises(SolverError):
+        reference._solved(cases[:1], Console(quiet=True))
 
 
 def test_a_program_in_the_present_folder_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
