@@ -50,8 +50,9 @@ static void watch_draw(taper_station_t *station, uint8_t i, uint32_t now_ms) {
         .measured_mA = measured_mA(station, i, now_ms),
         .min_mA = demand->min_mA,
     };
-    if (taper_draw_update(draw, &report, taper_station_world_ms(station, now_ms))) {
-        station->sessions.revision++; /* the planner is to know */
+    if (taper_draw_update(draw, &report, taper_station_world_ms(station, now_ms)) &&
+        !station->options.config->planning.on_events) { /* the paper's rule knows of no such event */
+        station->sessions.revision++;                   /* the planner is to know */
     }
     note_draw(station, i, before, report.measured_mA);
     if (draw->state != TAPER_DRAW_NORMAL) {
