@@ -37,20 +37,26 @@ void taper_look(OSQPSolver *osqp, bool last) {
 /** Ten tolerances are what check_termination() calls inaccurate. */
 #define INACCURATE_FACTOR 10
 
-void taper_look_within(OSQPSolver *osqp, OSQPFloat primal, OSQPFloat dual, bool last) {
+void taper_look_within(OSQPSolver *osqp, taper_tolerance_t tolerance, bool last) {
     OSQPInfo *info = osqp->info;
     update_status(info, OSQP_UNSOLVED);
     update_info(osqp, 0, 0);
-    if (info->prim_res <= primal && info->dual_res <= dual) {
+    if (info->prim_res <= tolerance.primal && info->dual_res <= tolerance.dual) {
         update_status(info, OSQP_SOLVED);
-    } else if (last && info->prim_res <= INACCURATE_FACTOR * primal &&
-               info->dual_res <= INACCURATE_FACTOR * dual) {
+    } else if (last && info->prim_res <= INACCURATE_FACTOR * tolerance.primal &&
+               info->dual_res <= INACCURATE_FACTOR * tolerance.dual) {
         update_status(info, OSQP_SOLVED_INACCURATE);
     }
 }
 
 OSQPFloat taper_balancing_penalty(const OSQPSolver *osqp) {
     return compute_rho_estimate(osqp);
+}
+
+OSQPFloat taper_balancing_penalty_within(const OSQPSolver *osqp, taper_tolerance_t tolerance) {
+    const OSQPFloat primal = osqp->info->prim_res / tolerance.primal;
+    const OSQPFloat dual = osqp->info->dual_res / tolerance.dual;
+    return osqp->settings->rho * c_sqrt(primal / dual);
 }
 
 static bool all_finite(const OSQPVectorf *vector) {

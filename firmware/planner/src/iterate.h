@@ -19,11 +19,22 @@ void taper_iterate(OSQPSolver *osqp, uint16_t count);
  */
 void taper_look(OSQPSolver *osqp, bool last);
 
-/** The same against tolerances of one's own, without the sizes of the problem. */
-void taper_look_within(OSQPSolver *osqp, OSQPFloat primal, OSQPFloat dual, bool last);
+/** Tolerances of one's own, without the sizes of the problem. */
+typedef struct {
+    OSQPFloat primal, dual;
+} taper_tolerance_t;
+
+/** taper_look() against such tolerances. */
+void taper_look_within(OSQPSolver *osqp, taper_tolerance_t tolerance, bool last);
 
 /** The penalty that would balance the residuals of the last look. May be not finite. */
 OSQPFloat taper_balancing_penalty(const OSQPSolver *osqp);
+
+/**
+ * The same, with each residual in its tolerance. OSQP's own takes them as shares of the multipliers, so that large ones make
+ * any dual residual look small: the penalty stays high, and the powers hardly move.
+ */
+OSQPFloat taper_balancing_penalty_within(const OSQPSolver *osqp, taper_tolerance_t tolerance);
 
 /** Whether all iterates are finite. Cost: O(rows), as everything else here. */
 bool taper_iterates_are_finite(const OSQPSolver *osqp);

@@ -25,7 +25,7 @@ _Static_assert(sizeof(OSQPFloat) == sizeof(taper_real_t),
  * The same of the log utility. Where the need of many cannot be met, lambda makes multipliers that are thousands of times the
  * gradients of the logarithm, which decide about the powers: the dual residual may be this share of them.
  */
-#define LOG_TOLERANCE  ((OSQPFloat)(TAPER_REAL_IS_DOUBLE ? 5e-4 : 2e-3))
+#define LOG_TOLERANCE  ((OSQPFloat)(TAPER_REAL_IS_DOUBLE ? 2e-4 : 2e-3))
 #define STEEPEST_SHARE ((OSQPFloat)(TAPER_REAL_IS_DOUBLE ? 1e-6 : 3e-5))
 /**
  * Tolerance of OSQP's tests for infeasibility. Standing still is always feasible and power is bounded, so they can only
@@ -176,10 +176,18 @@ static taper_verdict_t judge(const taper_planner_t *planner) {
     }
 }
 
+static taper_tolerance_t tolerance_of(const taper_planner_t *planner) {
+    return (taper_tolerance_t){.primal = LOG_TOLERANCE,
+                               .dual = LOG_TOLERANCE + STEEPEST_SHARE * planner->steepest};
+}
+
 /** The penalty for the next interval: the present one, unless the residuals are out of balance. */
-static OSQPFloat next_penalty(const OSQPSolver *osqp) {
+static OSQPFloat next_penalty(const taper_planner_t *planner) {
+    const OSQPSolver *osqp = planner->solver->osqp;
     const OSQPFloat present = osqp->settings->rho;
-    const OSQPFloat balancing = taper_balancing_penalty(osqp);
+    const OSQPFloat balancing = planner->horizon.log_utility
+                                    ? taper_balancing_penalty_within(osqp, tolerance_of(planner))
+                                    : taper_balancing_penalty(osqp);
     if (!isfinite(balancing)) {
         return present;
     }
@@ -222,7 +230,7 @@ static void look(taper_planner_t *planner) {
     OSQPSolver *osqp = planner->solver->osqp;
     const bool last = planner->iterations >= most_iterations(planner);
     if (planner->horizon.log_utility) {
-        taper_look_within(osqp, LOG_TOLERANCE, LOG_TOLERANCE + STEEPEST_SHARE * planner->steepest, last);
+        taper_look_within(osqp, tolerance_of(planner), last);
     } else {
         taper_look(osqp, last);
     }
@@ -235,7 +243,7 @@ static void look(taper_planner_t *planner) {
         go_on(planner);
     }
     if (planner->next == TAPER_WORK_ITERATIONS && planner->verdict == TAPER_VERDICT_SOLVING &&
-        planner->iterations % rho_interval(planner) == 0 && next_penalty(osqp) != osqp->settings->rho) {
+        planner->iterations % rho_interval(planner) == 0 && next_penalty(planner) != osqp->settings->rho) {
         planner->next = TAPER_WORK_PENALTY;
     }
 }
@@ -282,7 +290,7 @@ static void prepare(taper_planner_t *planner) {
         planner->next = TAPER_WORK_ITERATIONS;
         break;
     default:
-        osqp_update_rho(osqp, next_penalty(osqp));
+        osqp_update_rho(osqp, next_penalty(planner));
         planner->next = TAPER_WORK_ITERATIONS;
         break;
     }

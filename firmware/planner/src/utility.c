@@ -53,12 +53,19 @@ static taper_real_t allowed_at(const chain_t *chain, uint8_t t, taper_real_t cha
     return most;
 }
 
+/** Steps in which it may charge. */
+static uint8_t steps_of(const chain_t *chain) {
+    uint8_t count = 0;
+    for (uint8_t t = 0; t < chain->steps; t++) {
+        count = (uint8_t)(count + (chain->rate[t] > 0 ? 1 : 0));
+    }
+    return count;
+}
+
 /** Greatest power that its taper lets a fresh vehicle keep in all its steps. */
 static taper_real_t even_power(const chain_t *chain) {
-    taper_real_t steps = 0, even = TAPER_REAL_UNBOUNDED;
-    for (uint8_t t = 0; t < chain->steps; t++) {
-        steps += chain->rate[t] > 0 ? 1 : 0;
-    }
+    const taper_real_t steps = steps_of(chain);
+    taper_real_t even = TAPER_REAL_UNBOUNDED;
     for (uint8_t line = 0; line < chain->lines; line++) {
         even = taper_real_min(even,
                               chain->taper[line] / (1 + chain->slope[line] * taper_real_max(steps - 1, 0)));
@@ -117,6 +124,35 @@ static void fill_chain(const chain_t *chain, const taper_real_t *level) {
     }
 }
 
+/** What the site's power costs a vehicle by the multipliers of the last plan, in the mean of its steps. */
+static taper_real_t price_for(const taper_planner_t *planner, uint8_t i, const chain_t *chain) {
+    const taper_horizon_t *horizon = &planner->horizon;
+    const OSQPFloat *site = planner->solver->osqp->solution->y + taper_first_sum_row(horizon->config);
+    taper_real_t price = 0;
+    for (uint8_t t = 0; t < chain->steps; t++) {
+        price += chain->rate[t] > 0 ? site[t] : 0;
+    }
+    return price * horizon->weight[0][i] / (taper_real_t)steps_of(chain);
+}
+
+/**
+ * The multiplier to begin with for the energy of a vehicle that the last plan did not know: what more of it would be worth at
+ * the most that it can have, above its price. Built up by iterations it would take hundreds: lambda makes it large.
+ */
+static void value_energy(const taper_planner_t *planner, uint8_t i, const chain_t *chain) {
+    const taper_horizon_t *horizon = &planner->horizon;
+    const size_t row = taper_first_target_row(horizon->config) + i;
+    const uint8_t steps = steps_of(chain);
+    const taper_real_t most = horizon->upper[row] / horizon->target_scale;
+    if (steps == 0 || !(most > 0) || chain->need >= TAPER_REAL_UNBOUNDED / 2) {
+        return;
+    }
+    const taper_real_t worth = 2 * horizon->missing_weight * (chain->need - most) +
+                               (taper_real_t)steps / taper_real_max(most, LEAST_EXPANDED);
+    planner->solver->osqp->solution->y[row] =
+        taper_real_max(worth - price_for(planner, i, chain), 0) / horizon->target_scale;
+}
+
 /** Change the unit of a vehicle's part of the iterate, and the scale of the cost: multipliers are cost per row. */
 static void rescale_iterate(const taper_planner_t *planner, uint8_t i, taper_real_t unit, taper_real_t cost) {
     const taper_station_config_t *config = planner->horizon.config;
@@ -156,10 +192,7 @@ void taper_utility_end(taper_planner_t *planner) {
 
 /** Mean power of a vehicle's starting point over the steps in which it may have some; 0 without any. */
 static taper_real_t mean_power(const chain_t *chain) {
-    uint8_t count = 0;
-    for (uint8_t t = 0; t < chain->steps; t++) {
-        count = (uint8_t)(count + (chain->rate[t] > 0 ? 1 : 0));
-    }
+    const uint8_t count = steps_of(chain);
     return count > 0 ? taper_real_max(chain->energy[chain->steps - 1] / (taper_real_t)count, LEAST_EXPANDED)
                      : 0;
 }
@@ -241,7 +274,11 @@ void taper_utility_begin(taper_planner_t *planner) {
     }
     for (uint8_t i = 0; i < config->connector_count; i++) {
         const chain_t chain = chain_of(planner, i);
+        const bool is_new = !(chain.energy[config->steps - 1] > 0);
         fill_chain(&chain, level);
+        if (is_new) {
+            value_energy(planner, i, &chain);
+        }
     }
     choose_units(planner);
     keep_rates(planner);

@@ -18,7 +18,7 @@
  * Begin a problem that stands in `planner->horizon`: keep its rate limits in `planner->rate`, and make `solution->x` a
  * starting point that holds every row and gives something wherever something may be given. A vehicle that the last plan
  * knows keeps its powers; another one has an equal share of the site's power in every step, as far as its own limits allow
- * (water filling). Cost: O(connectors x steps x sums).
+ * (water filling), and its energy row begins with a multiplier that fits. Cost: O(connectors x steps x sums).
  */
 void taper_utility_begin(taper_planner_t *planner);
 

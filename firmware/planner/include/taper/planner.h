@@ -77,8 +77,9 @@ taper_status_t taper_planner_init(taper_planner_t *planner, const taper_solver_t
 
 /**
  * State a new problem. With the log utility it is a sequence of quadratic programmes, each around the answer of the last, until
- * nothing changes any more, and no more than taper_planning_t says. If one after the first has no usable answer, the last one's is the plan, INACCURATE. The last usable answer, moved on in time, is the starting point; after a problem that was dropped
- * or had no usable answer, the solver starts from nothing. The solver does not know of it before the next slice.
+ * nothing changes any more, and no more than taper_planning_t says. If one after the first has no usable answer, the last one's
+ * is the plan, INACCURATE. The last usable answer, moved on in time, is the starting point; after a problem that was dropped or
+ * had no usable answer, the solver starts from nothing. The solver does not know of it before the next slice.
  * `course` as in taper_horizon_build(). Cost: that of taper_horizon_build(), and O(entries of the matrices).
  */
 void taper_planner_start(taper_planner_t *planner, const taper_snapshot_t *snapshot,
@@ -89,7 +90,7 @@ void taper_planner_start(taper_planner_t *planner, const taper_snapshot_t *snaps
  * solve is sliced.
  *
  * From TAPER_MIN_SLICE on, `iterations` is rounded down to a multiple of it, and factorisations come on top: up to three
- * where a problem begins, and one after every 50 iterations. Below, a slice is short: it holds either at most `iterations`
+ * where a problem begins, and one after every 50 iterations (log utility: 20). Below, a slice is short: it holds either at most `iterations`
  * (at least 1) or one factorisation at most, and a problem takes three to four slices more than its iterations need.
  *
  * @return the verdict; TAPER_VERDICT_SOLVING: call again. Cost: docs/budgets.md has it, of an iteration and of slices.

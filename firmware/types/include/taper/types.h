@@ -132,7 +132,7 @@ typedef enum {
 
 /** Most outer iterations of the log utility, and how many there are at most if a description does not say. */
 #define TAPER_MAX_OUTER_ITERATIONS     20
-#define TAPER_DEFAULT_OUTER_ITERATIONS 8
+#define TAPER_DEFAULT_OUTER_ITERATIONS 12
 
 /** How the planner plans. All 0: throughput over all steps, once a step and at every event. */
 typedef struct {
