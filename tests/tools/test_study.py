@@ -17,7 +17,7 @@ from taperstudy.headlines import MARK, accept_headlines, broken_headlines, read_
 from taperstudy.recipes import (
     AcnWeek, DailyDrop, DrawnBatteries, EqualBatteries, Inputs, SiteLimit, limit_csv, working_day_kwh,
 )
-from taperstudy.settings import EVENTS, WEEK, real_week, synthetic
+from taperstudy.settings import EVENTS, WEEK, equal_week, real_week, synthetic
 from taperstudy.simulator_build import with_horizon
 from taperstudy.store import Store
 from taperstudy.worker import Programs, run_job
@@ -239,15 +239,21 @@ def test_every_section_has_cases_that_can_be_made_of_the_project_s_own_data():
             job_of(case, inputs)
 
 
-def test_a_full_battery_of_the_real_week_takes_nothing_more_at_the_steepest_taper():
-    sessions = Inputs().sessions(real_week(WEEK, 0.1).sessions)
+def test_batteries_of_the_real_week_are_of_many_sizes_and_lose_the_same_share():
+    sessions = Inputs().sessions(real_week(WEEK, 0.08).sessions)
+    assert {24.0, 40.0, 60.0, 100.0} <= {session.battery_kwh for session in sessions}
+    assert {round(session.taper_kw / session.max_kw, 3) for session in sessions} == {0.8}
+
+
+def test_a_full_battery_of_18_kwh_takes_nothing_more_at_the_steepest_taper():
+    sessions = Inputs().sessions(equal_week(WEEK, 0.1).sessions)
     assert {session.battery_kwh for session in sessions} == {18.0}
     assert all(0.1 <= session.soc_arrival <= 0.5 and session.soc_target <= 1 for session in sessions)
     assert {round(session.taper_kw / session.max_kw, 6) for session in sessions} == {1.0}
     lines = limit_csv(SiteLimit(hours=10), sessions).splitlines()
     assert lines[1] == f"0,{round(working_day_kwh(sessions) / 10, 3)}"
     assert working_day_kwh(sessions) == pytest.approx(requested_kwh(sessions) / 5, rel=0.06)  # little on the weekend
-    lighter = Inputs().sessions(real_week(WEEK, 0.05).sessions)
+    lighter = Inputs().sessions(equal_week(WEEK, 0.05).sessions)
     assert [session.soc_arrival for session in lighter] == [session.soc_arrival for session in sessions]
 
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 from . import figures
 from .cases import Case, Setting, bound_of
 from .model import Figure, Outcome, Results, Section, Table, cases_of, policy_table
-from .recipes import AcnWeek, DrawnBatteries, Inputs, SiteLimit
+from .recipes import Inputs
 from .settings import (
-    HOURS_OF_REQUESTS, LOG_POLICIES, SYNTHETIC_ALPHAS, WEEK, WEEK_ALPHAS, WEEK_BATTERY_KWH, gain_percent,
-    log_gain_percent, mean, real_week, short_name, six_settings, synthetic, week_setting,
+    HOURS_OF_REQUESTS, LITERAL_BATTERY_KWH, LOG_POLICIES, SYNTHETIC_ALPHAS, WEEK, WEEK_ALPHAS, equal_week,
+    gain_percent, log_gain_percent, mean, real_week, short_name, six_settings, synthetic,
 )
 
 LAMBDAS = (1, 10, 100, 1000)
@@ -16,10 +16,9 @@ CHOSEN_LAMBDA = 100  # the firmware's own
 HORIZONS = (12, 24, 48)
 CHOSEN_HORIZON = 24  # of the stations
 OUTER_ITERATIONS = tuple(range(1, 9))
-BATTERIES_KWH = (12.0, WEEK_BATTERY_KWH, 24.0)
+OTHER_BATTERIES_KWH = (12.0, 24.0)
 HOURS = (6.0, 10.0, 12.0, HOURS_OF_REQUESTS, 18.0)
 PAIRS = (*LOG_POLICIES, "mpc", "soc-mpc")
-KW_PER_CAR_AND_STEP_KWH = 1.8  # 7.2 kW in steps of 15 min
 
 
 def _with_lambda(setting: Setting, policy: str, weight: int) -> Case:
@@ -121,15 +120,16 @@ def outer_iterations() -> Section:
         + tuple(map(bound_of, settings)), _outer_outcome)
 
 
+def _literal_settings() -> list[Setting]:
+    return [equal_week(WEEK, alpha) for alpha in WEEK_ALPHAS]
+
+
 def _battery_settings() -> list[Setting]:
-    """All with the middle taper's share of power that a full battery has lost."""
-    alpha = WEEK_ALPHAS[1]
-    lost_share = alpha * WEEK_BATTERY_KWH / KW_PER_CAR_AND_STEP_KWH
-    sizes = [replace(real_week(WEEK, alpha * WEEK_BATTERY_KWH / kwh, kwh), name=f"{kwh:g} kWh each")
-             for kwh in BATTERIES_KWH]
-    drawn = week_setting("24 to 100 kWh, drawn", AcnWeek(WEEK, DrawnBatteries(lost_share)),
-                         SiteLimit(hours=HOURS_OF_REQUESTS))
-    return [*sizes, drawn]
+    """All tapers for drawn batteries and for those of 18 kWh; for others the middle one's share of power lost."""
+    middle = WEEK_ALPHAS[1] * LITERAL_BATTERY_KWH
+    others = [equal_week(WEEK, round(middle / kwh, 6), kwh) for kwh in OTHER_BATTERIES_KWH]
+    drawn = [replace(real_week(WEEK, alpha), name=f"drawn, as for alpha {alpha:g}") for alpha in WEEK_ALPHAS]
+    return [*drawn, *_literal_settings(), *others]
 
 
 def _pairs_table(results: Results, name: str, title: str, settings: list[Setting]) -> Table:
@@ -144,18 +144,23 @@ def _battery_outcome(results: Results) -> Outcome:
     settings = _battery_settings()
     title = "Gains of knowing the taper, and shares of the bound, by battery [%]"
     cases = [Case(setting, policy) for setting in settings for policy in PAIRS]
+    literal = [*map(synthetic, SYNTHETIC_ALPHAS), *_literal_settings()]
+    headlines = {"the same, with 18 kWh for all on the real week [%]":
+                 mean([log_gain_percent(results, setting) for setting in literal])}
     return Outcome([_pairs_table(results, "batteries", title, settings),
                     policy_table(results, "batteries-runs", "All runs", cases)],
-                   [Figure("Share of the bound by battery", "", figures.shares(results, settings, PAIRS))])
+                   [Figure("Share of the bound by battery", "", figures.shares(results, settings, PAIRS))], headlines)
 
 
 def batteries() -> Section:
     return Section(
         "batteries", "How it depends on the batteries of the real week",
-        "ACN-Data has no battery sizes. Here the middle taper of the real week with other sizes, each of which has lost the "
-        "same share of its power when full, and with the sizes and states that tools/import_acn.py draws. The limit serves "
-        "what is requested on a working day in the same hours as ever.",
-        tuple(cases_of(_battery_settings(), PAIRS)), _battery_outcome)
+        "ACN-Data has no battery sizes. The six settings draw them, from 24 to 100 kWh, as tools/import_acn.py does. Here also one "
+        "size for all: 18 kWh with the paper's alpha to the letter, and others that have lost the same share of their power "
+        "when full as those of 18 kWh at the middle alpha. The limit serves what is requested on a working day in the same "
+        "hours as ever.",
+        (*cases_of(_battery_settings(), PAIRS), *cases_of([*map(synthetic, SYNTHETIC_ALPHAS)], LOG_POLICIES)),
+        _battery_outcome)
 
 
 def _limit_settings() -> list[Setting]:

@@ -2,7 +2,7 @@
 
 from .cases import Case, Setting
 from .model import Results
-from .recipes import AcnWeek, EqualBatteries, Sessions, SiteLimit, SyntheticDay
+from .recipes import AcnWeek, DrawnBatteries, EqualBatteries, Sessions, SiteLimit, SyntheticDay
 
 # All that the study or a campaign can use, and steps of the horizon if they are not the station's own.
 STATIONS = (("hub", None), ("garage", None), ("paper", None), ("depot", None), ("caltech", None), ("dc_hub", None),
@@ -15,10 +15,13 @@ SYNTHETIC_KW = 56.0
 WEEK_SHARE = 0.35  # of the weeks with drawn batteries, as in tools/results.py
 CONTINUOUS = ("--min-current-a", "0")  # the paper knows no minimum current
 
-# The paper says neither how large the batteries of its real week are nor what its limit is. The data asks for 24.7 kWh per
-# session on average, so batteries are as large as they can be: with 7.2 kW, or 1.8 kWh a step, and the steepest taper of
-# 0.1, a battery of 18 kWh takes nothing more when it is full, and a larger one would never be.
-WEEK_BATTERY_KWH = 18.0
+# The paper says neither how large the batteries of its real week are nor what its limit is. They are drawn as everywhere in
+# this project: sizes of cars on the road, of which each request is a part (tools/import_acn.py). alpha is told per kWh in the
+# battery, and says little of batteries of many sizes: a full one has lost as much of its power as one of 18 kWh has by the
+# paper's alpha. That is the largest that the steepest alpha lets become full: 7.2 kW are 1.8 kWh a step. With 18 kWh for all,
+# the literal reading, sensitivity.py has the same three settings.
+LITERAL_BATTERY_KWH = 18.0
+KWH_PER_STEP = 1.8
 # The limit is as scarce as on the synthetic day: at full power it serves the requests of an average working day in as many
 # hours. There 779.5 kWh are requested, and 56 kW deliver them in 13.92 h.
 HOURS_OF_REQUESTS = 13.92
@@ -42,9 +45,20 @@ def short_name(week: str) -> str:
     return week.removeprefix("acn-").replace("-", " ", 1)
 
 
-def real_week(week: str, alpha: float, kwh: float = WEEK_BATTERY_KWH, hours: float = HOURS_OF_REQUESTS) -> Setting:
-    return week_setting(f"{short_name(week)}, alpha {alpha:g}", AcnWeek(week, EqualBatteries(kwh, alpha)),
+def lost_share(alpha: float) -> float:
+    """Of its power, that a full battery of the real week has lost."""
+    return round(alpha * LITERAL_BATTERY_KWH / KWH_PER_STEP, 6)
+
+
+def real_week(week: str, alpha: float, hours: float = HOURS_OF_REQUESTS) -> Setting:
+    return week_setting(f"{short_name(week)}, alpha {alpha:g}", AcnWeek(week, DrawnBatteries(lost_share(alpha))),
                         SiteLimit(hours=hours))
+
+
+def equal_week(week: str, alpha: float, kwh: float = LITERAL_BATTERY_KWH) -> Setting:
+    """The same with batteries of one size."""
+    return week_setting(f"{kwh:g} kWh each, alpha {alpha:g}", AcnWeek(week, EqualBatteries(kwh, alpha)),
+                        SiteLimit(hours=HOURS_OF_REQUESTS))
 
 
 def six_settings() -> list[Setting]:
