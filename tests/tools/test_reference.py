@@ -17,8 +17,10 @@ from taperlib.files import InputError
 from taperlib.gaps import Solved
 from taperlib.log_utility import DOUBT, PRECISE, Exact, LogUtility, SolverError
 from taperlib.planner_probe import demand_line, run_probe
+from taperlib.planner_times import Day
 from taperlib.planning_cases import KINDS, LAMBDAS, STATIONS, Case, draw, evenly, read_problems
 from taperlib.planning_problem import Demand, read_station
+from taperlib.written_out import solve_written_out
 
 HUB = read_station("hub")
 PEAK_KW = 22.08
@@ -224,8 +226,25 @@ def test_a_replay_is_compared_by_outer_iterations(tmp_path: Path) -> None:
 def test_a_days_times_are_compared(tmp_path: Path) -> None:
     assert run(tmp_path, "--limit-kw", "12", "--timing", "--problems", "2", "--out", str(tmp_path / "out")) == 0
     (row,) = csv.DictReader((tmp_path / "out/timing.csv").open())
-    assert row["exact_problems"] == "2"
+    assert (row.pop("which"), row["exact_problems"]) == ("all problems", "2")
     assert all(float(value) > 0 for value in row.values())
+
+
+def test_a_full_station_has_its_own_line() -> None:
+    cases = [draw(number) for number in range(12)]
+    taken = [len(case.demands) / case.station.connectors for case in cases]
+    groups = Day(cases, [1.0] * 12, [1.0] * 12).groups()
+    assert groups["all problems"] == list(range(12))
+    assert groups["a full station"] == [k for k, share in enumerate(taken) if share >= 0.75] != []
+
+
+@pytest.mark.parametrize("number", [0, 1, 2, 3])
+def test_written_out_by_vehicles_the_optimum_is_the_same(number: int) -> None:
+    case = draw(number)
+    utility, exact = LogUtility(case), LogUtility(case).solve_precisely()
+    answer = solve_written_out(case)
+    assert utility.gap(answer.power_kW, exact) < 1e-4
+    assert utility.first_step_difference(answer.power_kW, exact) < 5e-3
 
 
 @pytest.mark.parametrize("arguments", [(), ("--limit-kw", "9", "--outer-iterations", "0")])

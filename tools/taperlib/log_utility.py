@@ -70,9 +70,9 @@ class LogUtility:
         self.base_kW = station.base_W / 1000
         self.step_h = station.step_s / 3600
         self.need_kWh = np.array([demands[i].need_Wh / 1000 for i in self.connectors])
-        most = self._most().reshape(len(self.connectors), station.steps)
-        self.terms = most > NEGLIGIBLE
-        self.unit = self._units(most)
+        self.most = self._most().reshape(len(self.connectors), station.steps)  # per unit
+        self.terms = self.most > NEGLIGIBLE
+        self.unit = self._units(self.most)
 
     def _most(self) -> np.ndarray:
         """The least bound on each power by itself, per unit: from the rows in which nothing is negative."""

@@ -180,6 +180,7 @@ class Problem:
             allowed_mA = station.connector[connector].max_mA if max_mA is None else max_mA
             allowed_W = allowed_mA * self._draws[chain].W_per_A / 1000
             self._add_vehicle(chain, demands[connector], allowed_W)
+        self.first_sum = len(self._rows)  # rows of R from here on are the sums of the feeder tree
         for number, group in enumerate(station.groups):
             self._add_power(group, limit_W if number == 0 else None)
             self._add_lines(group, phase_A if number == 0 else None)
