@@ -282,7 +282,7 @@ static void test_a_tick_with_room_for_a_whole_solve_ends_with_a_plan_by_log_util
     const taper_planning_t planning = {.objective = TAPER_OBJECTIVE_LOG_UTILITY,
                                        .lambda_milli_per_kWh2 = 1000000};
     start_planning(&planning, &config);
-    bench_send_all(8, 30000);
+    bench_send_all(8, 45000);
     for (uint8_t node = 1; node <= 8;
          node++) { /* uneven and steep: many programmes, of many iterations each */
         taper_message_t steep = {.kind = TAPER_MESSAGE_EV_PARAM_D, .node = node};
