@@ -1,13 +1,11 @@
-#define _GNU_SOURCE // open_memstream
-
 #include "options.h"
 
 #include <argp.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "arguments.h"
+#include "options_check.h"
 #include "taper/stations.h"
 
 #define LONGEST_TICK_S 3600
@@ -21,58 +19,6 @@
 #define BUS_TIMEOUT_S     60
 #define LONGEST_TIMEOUT_S 3600
 static const char bus_prefix[] = "slcan:";
-
-static const char description[] =
-    "Replay charging sessions through the Taper firmware and a simulated fleet, in virtual time; or replay "
-    "the "
-    "recorded bus of a real station through it (--replay-log)."
-    "\v"
-    "SESSIONS CSV: a header, then one row per session, columns in any order: session_id, connector (1.., "
-    "empty: the first free one), arrival_s, departure_s [s], battery_kwh [kWh], soc_arrival, soc_target "
-    "[0..1], max_kw, taper_kw [kW], and optionally expected_departure_s [s], which is what the driver tells, "
-    "and phases (1 or 3, empty: all of the connector's) that the charger uses. "
-    "A vehicle takes at most max_kw - taper_kw * SOC and tells that; second_max_kw and second_taper_kw are a "
-    "second such line, and the lower one counts. With the optional column curve it obeys that instead: "
-    "points "
-    "SOC:KW by ascending SOC, separated by blanks, such as '0:95 0.18:90 0.8:50 1:8', linear in between; it "
-    "then tells the lines, and as its flat limit the greatest power of the curve.\n"
-    "\n"
-    "LIMIT CSV: time_s [s], ascending, and limit_kw [kW]; each limit holds until the next one, the first one "
-    "before its time too. The station's own limit holds besides.\n"
-    "\n"
-    "PRICE CSV: time_s [s], ascending, and price_per_kwh in any currency, -32.767..32.767; each price holds "
-    "until "
-    "the next one, the first one before its time too.\n"
-    "\n"
-    "TAPERS CSV: session_id, share of the charge, learned (some sample showed it) and sure (to 2.5 %) 0 or "
-    "1, limit by the station and the vehicle's own "
-    "[kW], at that energy and at the end of the charge, and error: the greater difference of the two, as a "
-    "share of max_kw.\n"
-    "\n"
-    "OUTPUT in DIR: summary.json, sessions.csv, steps.csv, connectors.csv. Equal runs give equal bytes, "
-    "except for solve_ms in summary.json, which is wall time. A session that is plugged in at the first tick "
-    "after its arrival has queued for 0 s.\n"
-    "\n"
-    "BOARD: with --bus the station is not part of this program, but runs on a board, or an emulated one, "
-    "that obeys "
-    "taper/drive.h. It gets frames and time from here; the same run without --bus, in a build with the "
-    "board's "
-    "floating-point type, gives the same bytes in all files of DIR and in that of --frames. Only "
-    "summary.json "
-    "differs: solve_ms is null there, and board tells what was measured. The board decides about the "
-    "policies "
-    "that it has: not equal-share. It has one bus, and no --problems.\n"
-    "\n"
-    "RECORDED BUS: --replay-log FILE feeds what taper-station --record FILE wrote to a fresh station, and "
-    "compares all that it sends with the recording, bit by bit. FILE.station, which was written with it, "
-    "tells how the station ran: no other option is needed, and one that is given goes before it. A log of "
-    "candump -l does too, if it begins before the station. It has no FILE.station: --station is needed, and "
-    "its times tell those of the station's calls to about a millisecond; a frame that came within that of a "
-    "call can make a difference that was none. Who sent a frame is told by its identifier. Both need the "
-    "station's life from its start, without a store, bus-off or a second controller.\n"
-    "\n"
-    "EXIT CODE: 0 good, 1 bad input, 2 bad command line, 3 a limit was exceeded, 4 a replay differs from its "
-    "recording.\n";
 
 enum {
     KEY_SESSIONS = 256,
@@ -125,7 +71,7 @@ static const struct argp_option options[] = {
      "station's own, or 100)",
      0},
     {"outer-iterations", KEY_OUTER_ITERATIONS, "N", 0,
-     "The same: quadratic programmes per plan, at most, 1..20 (default: the station's own, or 8)", 0},
+     "The same: quadratic programmes per plan, at most, 1..20 (default: the station's own, or 12)", 0},
     {"horizon-steps", KEY_HORIZON, "N", 0,
      "Steps that are planned, 2.. those of the station (default: the station's own, or all)", 0},
     {"replan", KEY_REPLAN, "WHEN", 0,
@@ -185,24 +131,10 @@ static const struct argp_option options[] = {
     {0},
 };
 
-/** The names, separated by commas; for help and errors. To be freed. */
-static char *policy_names(bool with_help) {
-    char *names = NULL;
-    size_t size = 0;
-    FILE *stream = open_memstream(&names, &size);
-    for (unsigned i = 0; stream != NULL && i < sim_policy_count; i++) {
-        fprintf(stream, "%s%s", i == 0 ? "" : with_help ? "; " : ", ", sim_policies[i].name);
-        if (with_help) {
-            fprintf(stream, " (%s)", sim_policies[i].help);
-        }
-    }
-    return stream != NULL && fclose(stream) == 0 ? names : NULL;
-}
-
 /** Add the names that this program knows to the help. */
 static char *add_names(int key, const char *text, void *input) {
     (void)input;
-    char *names = key == KEY_POLICY    ? policy_names(true)
+    char *names = key == KEY_POLICY    ? sim_policy_names(true)
                   : key == KEY_STATION ? taper_argument_station_names()
                                        : NULL;
     return taper_argument_with_names(text, names);
@@ -211,7 +143,7 @@ static char *add_names(int key, const char *text, void *input) {
 static void set_policy(sim_options_t *chosen, const char *name, struct argp_state *state) {
     chosen->policy = sim_policy_find(name);
     if (chosen->policy == NULL) {
-        argp_error(state, "--policy: unknown policy '%s'; there are %s", name, policy_names(false));
+        argp_error(state, "--policy: unknown policy '%s'; there are %s", name, sim_policy_names(false));
     }
 }
 
@@ -271,82 +203,6 @@ static void note_option(sim_options_t *chosen, int key) {
         chosen->run_option = name_of(key);
     }
     chosen->replay.station_given = chosen->replay.station_given || key == KEY_STATION;
-}
-
-/** What a board cannot do. */
-static void check_bus(const sim_options_t *chosen, struct argp_state *state) {
-    const taper_station_config_t *station = taper_stations[chosen->station];
-    if (chosen->problems_file != NULL) {
-        argp_error(state, "--problems and --bus exclude each other: the problems stay on the board");
-    }
-    if (chosen->policy->on_board < 0) {
-        argp_error(state, "--policy %s: a board (--bus) does not have it", chosen->policy->name);
-    }
-    if (chosen->lambda >= 0.0 || chosen->outer_iterations > 0 || chosen->horizon_steps > 0 ||
-        chosen->replan_given) {
-        argp_error(state, "--bus: how a board plans is in its own description of the station");
-    }
-    if (chosen->learns || chosen->tapers_file != NULL) {
-        argp_error(state,
-                   "--learn-taper and --tapers: whether a board (--bus) learns is in its own description");
-    }
-    if (taper_setup_buses(station) > 1) {
-        argp_error(state, "--bus: station %s has %u CAN buses, and SLCAN carries one", station->name,
-                   taper_setup_buses(station));
-    }
-}
-
-/** What can only be checked when all options are known. */
-static void check_run(const sim_options_t *chosen, struct argp_state *state) {
-    if (chosen->replay_option != NULL) {
-        argp_error(state, "--%s needs --replay-log", chosen->replay_option);
-    }
-    if (chosen->sessions_file == NULL) {
-        argp_error(state, "--sessions is needed");
-    }
-    if (chosen->policy == NULL) {
-        argp_error(state, "--policy is needed: one of %s", policy_names(false));
-        return;
-    }
-    if (chosen->limit_file != NULL && chosen->limit_kw >= 0.0) {
-        argp_error(state, "--limit-kw and --limit-csv exclude each other");
-    }
-    if (chosen->station == taper_station_count) {
-        argp_error(state, "--station is needed: one of %s", taper_argument_station_names());
-    }
-    const double most_A = sim_least_maximum_A(taper_stations[chosen->station]);
-    if (chosen->min_current_A > most_A) {
-        argp_error(state, "--min-current-a: above %g A, the most that a connector of this station gives",
-                   most_A);
-    }
-    if (chosen->unannounced && chosen->limit_file == NULL) {
-        argp_error(state, "--limit-unannounced needs --limit-csv");
-    }
-    if (chosen->errors.soc_absent && chosen->errors.soc > 0.0) {
-        argp_error(state, "--soc absent and --soc-error exclude each other");
-    }
-    if (chosen->horizon_steps > taper_stations[chosen->station]->steps) {
-        argp_error(state, "--horizon-steps: station %s has %u", taper_stations[chosen->station]->name,
-                   (unsigned)taper_stations[chosen->station]->steps);
-    }
-    if (chosen->bus != NULL) {
-        check_bus(chosen, state);
-    } else if (chosen->bus_timeout_s > 0) {
-        argp_error(state, "--bus-timeout-s needs --bus");
-    }
-}
-
-static void check(sim_options_t *chosen, struct argp_state *state) {
-    if (chosen->replay.file == NULL) {
-        check_run(chosen, state);
-        return;
-    }
-    chosen->replay.setup.station = chosen->station;
-    chosen->replay.setup.limit_kw = chosen->limit_kw;
-    chosen->replay.setup.iterations = chosen->iterations;
-    if (chosen->run_option != NULL) {
-        argp_error(state, "--%s and --replay-log exclude each other", chosen->run_option);
-    }
 }
 
 static void set_bus(sim_options_t *chosen, const char *text, struct argp_state *state) {
@@ -466,7 +322,7 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     case KEY_SEED: chosen->seed = taper_argument_whole("--seed", text, 0, UINT64_MAX, state); break;
     case KEY_OUT: chosen->out = text; break;
     case ARGP_KEY_ARG: argp_error(state, "unexpected argument '%s'", text); break;
-    case ARGP_KEY_END: check(chosen, state); break;
+    case ARGP_KEY_END: sim_options_check(chosen, state); break;
     default:
         return parse_bus(key, text, chosen, state) || parse_planning(key, text, chosen, state) ||
                        parse_errors(key, text, chosen, state) ||
@@ -477,17 +333,9 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     return 0;
 }
 
-double sim_least_maximum_A(const taper_station_config_t *station) {
-    int32_t least_mA = INT32_MAX;
-    for (unsigned i = 0; i < station->connector_count; i++) {
-        least_mA = taper_min_i32(least_mA, station->connectors[i].max_mA);
-    }
-    return least_mA / 1000.0;
-}
-
 sim_options_t sim_options_parse(int argc, char **argv) {
     static const struct argp parser = {
-        .options = options, .parser = parse, .doc = description, .help_filter = add_names};
+        .options = options, .parser = parse, .doc = sim_options_help, .help_filter = add_names};
     sim_options_t chosen = {.limit_kw = -1.0,
                             .min_current_A = -1.0,
                             .price_weight = -1.0,
