@@ -1,7 +1,7 @@
 #include "taper/planner.h"
 
-#include <math.h>
 #include <string.h>
+#include <tgmath.h>
 
 #include "iterate.h"
 #include "matrices.h"
@@ -22,11 +22,14 @@ _Static_assert(sizeof(OSQPFloat) == sizeof(taper_real_t),
 #define ABSOLUTE_TOLERANCE ((OSQPFloat)(TAPER_REAL_IS_DOUBLE ? 1e-4 : 1e-3))
 #define RELATIVE_TOLERANCE ((OSQPFloat)(TAPER_REAL_IS_DOUBLE ? 3e-4 : 1e-3))
 /**
- * The same of the log utility. Where the need of many cannot be met, lambda makes multipliers that are thousands of times the
- * gradients of the logarithm, which decide about the powers: the dual residual may be this share of them.
+ * The same of the log utility: the primal one as a share of the vehicles' mean power, which may be a small part of the
+ * strongest connector's, as far as there is precision for that. Where the need of many cannot be met, lambda makes multipliers
+ * that are thousands of times the gradients of the logarithm, which decide about the powers: the dual residual may be a share
+ * of them besides.
  */
-#define LOG_TOLERANCE  ((OSQPFloat)(TAPER_REAL_IS_DOUBLE ? 2e-4 : 2e-3))
-#define STEEPEST_SHARE ((OSQPFloat)(TAPER_REAL_IS_DOUBLE ? 1e-6 : 3e-5))
+#define LOG_PRIMAL_TOLERANCE ((OSQPFloat)(TAPER_REAL_IS_DOUBLE ? 4e-4 : 2e-3))
+#define LOG_DUAL_TOLERANCE   ((OSQPFloat)(TAPER_REAL_IS_DOUBLE ? 2e-4 : 2e-3))
+#define STEEPEST_SHARE       ((OSQPFloat)(TAPER_REAL_IS_DOUBLE ? 5e-7 : 3e-5))
 /**
  * Tolerance of OSQP's tests for infeasibility. Standing still is always feasible and power is bounded, so they can only
  * be wrong; and at the end of a slice their approximate form would throw the iterates away.
@@ -147,11 +150,17 @@ bool taper_planner_is_usable(taper_verdict_t verdict) {
     return verdict == TAPER_VERDICT_SOLVED || verdict == TAPER_VERDICT_INACCURATE;
 }
 
+static taper_tolerance_t tolerance_of(const taper_planner_t *planner) {
+    const taper_real_t size = TAPER_REAL_IS_DOUBLE ? taper_real_min(sqrt(planner->cost_scale), 1) : 1;
+    return (taper_tolerance_t){.primal = LOG_PRIMAL_TOLERANCE * size,
+                               .dual = LOG_DUAL_TOLERANCE + STEEPEST_SHARE * planner->steepest};
+}
+
 /** Whether the rows hold by our own account: the solver's says nothing if its memory is not what we gave it. */
 static bool rows_hold(const taper_planner_t *planner) {
     const taper_residual_t residual = taper_residual(&planner->horizon, planner->solver->osqp->solution->x);
     const bool is_log = planner->horizon.log_utility;
-    const taper_real_t absolute = is_log ? LOG_TOLERANCE : ABSOLUTE_TOLERANCE;
+    const taper_real_t absolute = is_log ? tolerance_of(planner).primal : ABSOLUTE_TOLERANCE;
     const taper_real_t tolerance = absolute + (is_log ? 0 : RELATIVE_TOLERANCE * residual.size);
     return residual.worst <= RESIDUAL_FACTOR * tolerance + absolute;
 }
@@ -174,11 +183,6 @@ static taper_verdict_t judge(const taper_planner_t *planner) {
         return planner->iterations < most_iterations(planner) ? TAPER_VERDICT_SOLVING : TAPER_VERDICT_LATE;
     default: return TAPER_VERDICT_REFUSED; /* standing still is always feasible: a numerical fault */
     }
-}
-
-static taper_tolerance_t tolerance_of(const taper_planner_t *planner) {
-    return (taper_tolerance_t){.primal = LOG_TOLERANCE,
-                               .dual = LOG_TOLERANCE + STEEPEST_SHARE * planner->steepest};
 }
 
 /** The penalty for the next interval: the present one, unless the residuals are out of balance. */
