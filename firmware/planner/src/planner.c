@@ -23,13 +23,15 @@ _Static_assert(sizeof(OSQPFloat) == sizeof(taper_real_t),
 #define RELATIVE_TOLERANCE ((OSQPFloat)(TAPER_REAL_IS_DOUBLE ? 3e-4 : 1e-3))
 /**
  * The same of the log utility: the primal one as a share of the vehicles' mean power, which may be a small part of the
- * strongest connector's, as far as there is precision for that. Where the need of many cannot be met, lambda makes multipliers
+ * strongest connector's. Where the need of many cannot be met, lambda makes multipliers
  * that are thousands of times the gradients of the logarithm, which decide about the powers: the dual residual may be a share
  * of them besides.
  */
 #define LOG_PRIMAL_TOLERANCE ((OSQPFloat)(TAPER_REAL_IS_DOUBLE ? 4e-4 : 2e-3))
 #define LOG_DUAL_TOLERANCE   ((OSQPFloat)(TAPER_REAL_IS_DOUBLE ? 2e-4 : 2e-3))
-#define STEEPEST_SHARE       ((OSQPFloat)(TAPER_REAL_IS_DOUBLE ? 5e-7 : 3e-5))
+#define STEEPEST_SHARE       ((OSQPFloat)(TAPER_REAL_IS_DOUBLE ? 5e-7 : 1e-5))
+/** Mean powers below this share of the strongest connector's have no tolerance of their own: float has not the digits. */
+#define LEAST_SIZE ((taper_real_t)(TAPER_REAL_IS_DOUBLE ? 0 : 0.1))
 /**
  * Tolerance of OSQP's tests for infeasibility. Standing still is always feasible and power is bounded, so they can only
  * be wrong; and at the end of a slice their approximate form would throw the iterates away.
@@ -151,7 +153,7 @@ bool taper_planner_is_usable(taper_verdict_t verdict) {
 }
 
 static taper_tolerance_t tolerance_of(const taper_planner_t *planner) {
-    const taper_real_t size = TAPER_REAL_IS_DOUBLE ? taper_real_min(sqrt(planner->cost_scale), 1) : 1;
+    const taper_real_t size = taper_real_min(taper_real_max(sqrt(planner->cost_scale), LEAST_SIZE), 1);
     return (taper_tolerance_t){.primal = LOG_PRIMAL_TOLERANCE * size,
                                .dual = LOG_DUAL_TOLERANCE + STEEPEST_SHARE * planner->steepest};
 }
