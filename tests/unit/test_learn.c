@@ -300,7 +300,10 @@ static void test_garbage_makes_no_nonsense(void) {
         TEST_ASSERT_TRUE(taper_learn_limit_W(&trial.learn, energy_Wh) >= 0);
         TEST_ASSERT_TRUE(demand.taper_W >= 0 && demand.peak_W >= 0);
         TEST_ASSERT_TRUE(taper_learn_noise_permille(&trial.learn) >= 10);
-        TEST_ASSERT_TRUE(isfinite((double)trial.learn.level) && isfinite((double)trial.learn.spread));
+        taper_learn_shift_t shown = {0};
+        if (taper_learn_shown(&trial.learn, &shown)) {
+            TEST_ASSERT_TRUE(isfinite((double)shown.level) && isfinite((double)shown.fall));
+        }
     }
 }
 

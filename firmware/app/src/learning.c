@@ -84,21 +84,21 @@ static void note_show(const taper_station_t *station, taper_learning_t *learning
 
 /** What it draws, against its line. One that draws next to nothing pauses, and shows nothing. */
 static void take_sample(taper_station_t *station, taper_learning_t *learning, const taper_demand_t *demand,
-                        int32_t energy_Wh, int32_t measured_mA, bool has_risen) {
+                        int32_t measured_mA, bool has_risen) {
     if (measured_mA == TAPER_ABSENT || measured_mA <= TAPER_DRAW_FLOWS_mA) {
         return;
     }
     const int32_t deviation = taper_learn_noise_permille(&learning->line);
     const int32_t less_mA = LESS_mA + part(measured_mA, LESS_deviations * deviation);
     const taper_learn_sample_t sample = {
-        .energy_Wh = energy_Wh,
+        .energy_Wh = learning->looked_Wh,
         /* EVSE_STATUS rounds up: the middle of its step. */
         .power_W = part(measured_mA - TAPER_CURRENT_STEP_mA / 2, demand->W_per_A),
         .step_W = part(TAPER_CURRENT_STEP_mA, demand->W_per_A),
         .offered_W = has_risen ? part(learning->settled_mA, demand->W_per_A) : 0,
         .limits = measured_mA < learning->settled_mA - less_mA,
     };
-    const int32_t limit_W = taper_learn_limit_W(&learning->line, energy_Wh);
+    const int32_t limit_W = taper_learn_limit_W(&learning->line, learning->looked_Wh);
     taper_learn_take(&learning->line, &sample);
     if (sample.limits) {
         note_show(station, learning);
@@ -117,6 +117,14 @@ static void tell_planner(taper_station_t *station, taper_learning_t *learning, c
     }
 }
 
+/** A vehicle gives the fleet what it has shown, once; until then it takes the fleet's guess. */
+static void ask_fleet(taper_station_t *station, taper_learning_t *learning) {
+    learning->counted = learning->counted || taper_fleet_count(&station->fleet, &learning->line);
+    if (!learning->counted) {
+        taper_fleet_advise(&station->fleet, &learning->line);
+    }
+}
+
 void taper_learning_look(taper_station_t *station, uint8_t i, int32_t measured_mA) {
     taper_learning_t *learning = &station->learning[i];
     taper_demand_t *demand = &station->snapshot.demand[i];
@@ -125,17 +133,22 @@ void taper_learning_look(taper_station_t *station, uint8_t i, int32_t measured_m
         return;
     }
     if (learning->session != demand->session) {
-        *learning = (taper_learning_t){.session = demand->session};
+        *learning = (taper_learning_t){.session = demand->session, .looked_Wh = energy_Wh};
         taper_learn_begin(&learning->line, demand, energy_Wh);
     }
+    ask_fleet(station, learning);
     const bool has_risen = follow_offer(station, i, learning);
-    take_sample(station, learning, demand, energy_Wh, measured_mA, has_risen);
+    take_sample(station, learning, demand, measured_mA, has_risen);
+    learning->looked_Wh = energy_Wh;
     taper_learn_apply(&learning->line, energy_Wh, demand);
     tell_planner(station, learning, demand, energy_Wh);
 }
 
-/** Whether it is time to offer more than the line at the expense of others. */
+/** Whether it is time to offer more than the line at the expense of others. Not where a tick is longer than that is to last. */
 static bool is_due(const taper_station_t *station, taper_learning_t *learning, bool sure) {
+    if (station->options.config->tick_ms > SHOW_ms) {
+        return false;
+    }
     const uint32_t rested_ms = taper_elapsed_ms(station->snapshot.now_ms, learning->since_ms);
     if (learning->rests && rested_ms >= (sure ? REST_IF_SURE_ms : REST_ms)) {
         learning->rests = false;
