@@ -144,9 +144,16 @@ void taper_learning_look(taper_station_t *station, uint8_t i, int32_t measured_m
     tell_planner(station, learning, demand, energy_Wh);
 }
 
-/** Whether it is time to offer more than the line at the expense of others. Not where a tick is longer than that is to last. */
-static bool is_due(const taper_station_t *station, taper_learning_t *learning, bool sure) {
-    if (station->options.config->tick_ms > SHOW_ms) {
+/**
+ * Whether it is time to offer more than the line at the expense of others. A tick that is longer than that is to last costs them more:
+ * there only where the line may well be wrong by the margin, which is two deviations.
+ */
+static bool is_due(const taper_station_t *station, uint8_t i, taper_learning_t *learning, bool sure) {
+    const taper_demand_t *demand = &station->snapshot.demand[i];
+    const int32_t energy_Wh = station->sessions.session[i].session_Wh;
+    const int32_t limit_W = taper_battery_limit_W(demand);
+    if (station->options.config->tick_ms > SHOW_ms &&
+        2 * taper_learn_deviation_W(&learning->line, energy_Wh) < margin_W(learning, demand, limit_W)) {
         return false;
     }
     const uint32_t rested_ms = taper_elapsed_ms(station->snapshot.now_ms, learning->since_ms);
@@ -173,7 +180,7 @@ static void probe(taper_station_t *station, uint8_t i) {
     }
     const int32_t energy_Wh = station->sessions.session[i].session_Wh;
     const bool sure = taper_learn_is_sure(&learning->line, energy_Wh, demand->need_Wh);
-    const bool due = is_due(station, learning, sure);
+    const bool due = is_due(station, i, learning, sure);
     const int32_t more_W = taper_min_i32(margin_W(learning, demand, limit_W), allowed_W - limit_W);
     if (due && proposal->wish_W[i] >= part(limit_W, ALL_permille)) {
         proposal->wish_W[i] = limit_W + more_W;

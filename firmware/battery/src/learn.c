@@ -21,9 +21,11 @@
 #define CLIP  ((taper_real_t)3)
 #define DRIFT ((taper_real_t)0.5)
 #define WRONG ((taper_real_t)12)
-/* A vehicle that takes all it may, so many deviations above the line, lifts it; and so far above, at once. */
+/* A vehicle that takes all it may, so many deviations above the line, lifts it; so far off, above or below, counts at once. */
 #define LIFTS ((taper_real_t)3)
 #define LEAPS ((taper_real_t)4)
+/* So many deviations less than an offer are not held against a vehicle that follows it. */
+#define SPARED ((taper_real_t)1)
 /* An offer so far above the line is refused, if the line is right. */
 #define CLEAR     ((taper_real_t)2)
 #define LEAST_kW  ((taper_real_t)0.01)
@@ -233,6 +235,20 @@ static void lift(taper_learn_t *learn, taper_real_t energy, taper_real_t power, 
 }
 
 /*
+ * Of an offer that is not clear of the line, what noise lowers looks like a limit: to take that for a sample would pull the line
+ * down, offers with it, and so on. Only what noise hardly does counts at once; else it takes several looks in a row.
+ */
+static void watch_shortfall(taper_learn_t *learn, const taper_learn_sums_t *line, taper_real_t energy,
+                            taper_real_t power, taper_real_t short_by) {
+    const taper_real_t counts = taper_real_min(taper_real_max(short_by - SPARED, -CLIP), CLIP);
+    learn->falls = taper_real_max(learn->falls + counts - DRIFT, 0);
+    if (short_by > LEAPS || learn->falls > WRONG) {
+        learn->knows = true;
+        begin_anew(learn, line, energy, power);
+    }
+}
+
+/*
  * All that is drawn of an offer clear of the line counts as a sample: to leave out what noise raises would pull the line down,
  * and most where it is poor; its slope would follow.
  */
@@ -249,8 +265,10 @@ void taper_learn_take(taper_learn_t *learn, const taper_learn_sample_t *sample) 
     const taper_real_t noise = noise_of(learn, power, kilo(taper_max_i32(sample->step_W, 0)));
     const taper_real_t limit = limit_at(&line, energy);
     const taper_real_t residual = (power - limit) / (noise * sqrt(1 + doubt_at(&line, energy)));
-    if (sample->limits || offered > limit + CLEAR * noise || residual >= LIFTS) {
+    if (offered > limit + CLEAR * noise || residual >= LIFTS) {
         fit(learn, &line, energy, power, residual);
+    } else if (offered > 0) {
+        watch_shortfall(learn, &line, energy, power, (taper_real_min(limit, offered) - power) / noise);
     }
     if (!sample->limits) {
         lift(learn, energy, power, noise);
@@ -263,6 +281,15 @@ int32_t taper_learn_limit_W(const taper_learn_t *learn, int32_t energy_Wh) {
     }
     const taper_learn_sums_t line = line_of(learn);
     return taper_real_to_W(limit_at(&line, kilo(energy_Wh)) / PER_KILO, INT32_MAX);
+}
+
+int32_t taper_learn_deviation_W(const taper_learn_t *learn, int32_t energy_Wh) {
+    if (!(learn->peak > 0)) {
+        return 0;
+    }
+    const taper_learn_sums_t line = line_of(learn);
+    const taper_real_t deviation = noise_of(learn, line.level, 0) * sqrt(doubt_at(&line, kilo(energy_Wh)));
+    return taper_real_to_W(deviation / PER_KILO, INT32_MAX);
 }
 
 int32_t taper_learn_noise_permille(const taper_learn_t *learn) {

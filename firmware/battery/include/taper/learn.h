@@ -105,6 +105,9 @@ void taper_learn_take(taper_learn_t *learn, const taper_learn_sample_t *sample);
 /** The limit at an energy [W], >= 0. */
 int32_t taper_learn_limit_W(const taper_learn_t *learn, int32_t energy_Wh);
 
+/** The deviation of that, by what is known [W]. */
+int32_t taper_learn_deviation_W(const taper_learn_t *learn, int32_t energy_Wh);
+
 /** The deviation of a measurement [permille of it]. */
 int32_t taper_learn_noise_permille(const taper_learn_t *learn);
 
