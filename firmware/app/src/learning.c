@@ -119,6 +119,7 @@ static void tell_planner(taper_station_t *station, taper_learning_t *learning, c
 
 /** A vehicle gives the fleet what it has shown, once; until then it takes the fleet's guess. */
 static void ask_fleet(taper_station_t *station, taper_learning_t *learning) {
+    taper_fleet_watch(&station->fleet, &learning->line);
     learning->counted = learning->counted || taper_fleet_count(&station->fleet, &learning->line);
     if (!learning->counted) {
         taper_fleet_advise(&station->fleet, &learning->line);

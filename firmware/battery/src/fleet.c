@@ -6,6 +6,8 @@
 
 /* A vehicle is counted once its shift is known to a tenth of its peak. */
 #define KNOWN_VARIANCE ((taper_real_t)0.01)
+/* Share of the way to a vehicle's noise that each look moves the station's. */
+#define NOISE_MOVES ((taper_real_t)0.01)
 
 static unsigned kind_of(const taper_learn_t *learn) {
     return taper_learn_tells(learn) ? 1U : 0U;
@@ -49,8 +51,14 @@ bool taper_fleet_count(taper_fleet_t *fleet, const taper_learn_t *learn) {
     taper_fleet_kind_t *kind = &fleet->kind[kind_of(learn)];
     add(&kind->level, shown.level, shown.level_variance, first.level_variance);
     add(&kind->fall, shown.fall, shown.fall_variance, first.fall_variance);
-    add(&kind->noise, shown.noise, 0, 1);
     return true;
+}
+
+void taper_fleet_watch(taper_fleet_t *fleet, const taper_learn_t *learn) {
+    taper_real_t noise;
+    if (taper_learn_noise(learn, &noise)) {
+        fleet->noise = fleet->noise > 0 ? fleet->noise + (noise - fleet->noise) * NOISE_MOVES : noise;
+    }
 }
 
 /* The shift of the next vehicle: the mean, drawn towards none by what is not known of it. @return its variance. */
@@ -64,10 +72,13 @@ static taper_real_t guess(const taper_fleet_mean_t *mean, taper_real_t first, ta
 void taper_fleet_advise(const taper_fleet_t *fleet, taper_learn_t *learn) {
     const taper_fleet_kind_t *kind = &fleet->kind[kind_of(learn)];
     taper_learn_shift_t first;
+    if (fleet->noise > 0) {
+        taper_learn_assume_noise(learn, fleet->noise);
+    }
     if (!taper_learn_first(learn, &first) || !(kind->fall.weight > 0)) {
         return;
     }
-    taper_learn_shift_t shift = {.noise = kind->noise.mean};
+    taper_learn_shift_t shift;
     shift.level_variance = guess(&kind->level, first.level_variance, &shift.level);
     shift.fall_variance = guess(&kind->fall, first.fall_variance, &shift.fall);
     taper_learn_assume(learn, &shift);

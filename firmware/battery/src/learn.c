@@ -10,6 +10,8 @@
 /* Deviation of a measurement, as a share of it, and what one look changes of that. Of normal noise the difference of two is
    below 0.954 deviations in half of all cases; for a median, to move by 1/n at the n-th look is about best. */
 #define LEAST_NOISE  ((taper_real_t)0.01)
+#define FIRST_NOISE  ((taper_real_t)0.025)
+#define SETTLED      16
 #define MOST_NOISE   ((taper_real_t)0.06)
 #define NOISE_MOVES  ((taper_real_t)0.05)
 #define NOISE_MEDIAN ((taper_real_t)0.954)
@@ -102,7 +104,7 @@ static taper_real_t fall_doubt(const taper_learn_t *learn, const taper_demand_t 
 
 void taper_learn_begin(taper_learn_t *learn, const taper_demand_t *told, int32_t energy_Wh) {
     const int32_t stored_Wh = told->capacity_Wh > 0 ? told->stored_Wh : 0;
-    *learn = (taper_learn_t){.noise = LEAST_NOISE, .strayed = NO_LOOK, .tells = told->taper_W > 0};
+    *learn = (taper_learn_t){.noise = FIRST_NOISE, .strayed = NO_LOOK, .tells = told->taper_W > 0};
     learn->peak = taper_real_max(kilo(taper_min_i32(told->peak_W, taper_demand_allowed_W(told))), LEAST_kW);
     learn->capacity = told->capacity_Wh > 0 ? taper_real_max(kilo(told->capacity_Wh), LEAST_kWh) : 0;
     learn->told = (taper_learn_guess_t){.centre = kilo(taper_max_i32(energy_Wh, 0)) - kilo(stored_Wh),
@@ -123,8 +125,7 @@ bool taper_learn_first(const taper_learn_t *learn, taper_learn_shift_t *shift) {
     }
     *shift = (taper_learn_shift_t){.level_variance = square(PEAK_DOUBT),
                                    .fall_variance =
-                                       learn->told.fall_variance * square(learn->capacity / learn->peak),
-                                   .noise = LEAST_NOISE};
+                                       learn->told.fall_variance * square(learn->capacity / learn->peak)};
     return true;
 }
 
@@ -139,8 +140,7 @@ bool taper_learn_shown(const taper_learn_t *learn, taper_learn_shift_t *shift) {
         (taper_learn_shift_t){.level = (level - learn->told.level) / learn->peak,
                               .fall = (fall - learn->told.fall) * learn->capacity / learn->peak,
                               .level_variance = square(learn->noise) * doubt_at(samples, learn->told.centre),
-                              .fall_variance = square(learn->noise * learn->capacity) / samples->spread,
-                              .noise = learn->noise};
+                              .fall_variance = square(learn->noise * learn->capacity) / samples->spread};
     return true;
 }
 
@@ -154,8 +154,17 @@ void taper_learn_assume(taper_learn_t *learn, const taper_learn_shift_t *shift) 
     learn->guess.level_variance = shift->level_variance * square(learn->peak);
     learn->guess.fall_variance = shift->fall_variance * square(per_kWh);
     learn->knows = true;
+}
+
+bool taper_learn_noise(const taper_learn_t *learn, taper_real_t *noise) {
+    *noise = learn->noise;
+    return learn->looks >= SETTLED;
+}
+
+void taper_learn_assume_noise(taper_learn_t *learn, taper_real_t noise) {
     if (learn->looks == 0) {
-        learn->noise = taper_real_min(taper_real_max(shift->noise, LEAST_NOISE), MOST_NOISE);
+        learn->noise = taper_real_min(taper_real_max(noise, LEAST_NOISE), MOST_NOISE);
+        learn->looks = SETTLED;
     }
 }
 

@@ -9,7 +9,7 @@
  * TAPER_LEARN_HUBER deviations counts less.
  *
  * Those that tell a taper and those that tell none are two fleets. Vehicles of unknown capacity belong to none: their lines
- * cannot be compared. One whose line is flat at first and falls later is counted by what it showed first.
+ * cannot be compared. The noise of the station's meters is taken from all. One whose line is flat at first and falls later is counted by what it showed first.
  *
  * Source: shrinkage of a normal mean (empirical Bayes).
  */
@@ -29,12 +29,13 @@ typedef struct {
 
 /** Vehicles that tell the same kind of thing. All 0: none was seen yet. */
 typedef struct {
-    taper_fleet_mean_t level, fall, noise;
+    taper_fleet_mean_t level, fall;
 } taper_fleet_kind_t;
 
 /** The caller's memory; its content is private. All 0 is a station that has seen nobody. */
 typedef struct {
     taper_fleet_kind_t kind[2]; /**< those that tell no taper, and those that do */
+    taper_real_t noise;         /**< of a measurement, as a share of it; 0: not known */
 } taper_fleet_t;
 
 /**
@@ -43,7 +44,10 @@ typedef struct {
  */
 bool taper_fleet_count(taper_fleet_t *fleet, const taper_learn_t *learn);
 
-/** Give a vehicle that was not counted the fleet's guess. Nothing happens as long as nobody was counted. */
+/** Take the noise of its measurements into account: after each look. */
+void taper_fleet_watch(taper_fleet_t *fleet, const taper_learn_t *learn);
+
+/** Give a vehicle that was not counted the fleet's guess. As long as nobody was counted that is of the noise only. */
 void taper_fleet_advise(const taper_fleet_t *fleet, taper_learn_t *learn);
 
 #endif

@@ -20,7 +20,7 @@
  * - **Memory.** At most TAPER_LEARN_MOST samples weigh in full; beyond, the oldest fade.
  *
  * - **Noise.** The deviation of a measurement is taken from what changes from look to look, which no wrong line does: 1 to
- *   6 % of it, and half a step of its resolution. The first looks move it most.
+ *   6 % of it, and half a step of its resolution. It begins in the middle of that, and the first looks move it most.
  */
 #ifndef TAPER_LEARN_H
 #define TAPER_LEARN_H
@@ -55,7 +55,6 @@ typedef struct {
 typedef struct {
     taper_real_t level, fall;
     taper_real_t level_variance, fall_variance;
-    taper_real_t noise; /**< deviation of a measurement, as a share of it */
 } taper_learn_shift_t;
 
 /** What is known of one vehicle. The caller's memory; its content is private. [kW], [kWh] */
@@ -90,14 +89,20 @@ void taper_learn_begin(taper_learn_t *learn, const taper_demand_t *told, int32_t
 /** Whether it told a taper. */
 bool taper_learn_tells(const taper_learn_t *learn);
 
-/** The variances, and the noise, that a line begins with; shifts of 0. @return false if the capacity is unknown. */
+/** The variances that a line begins with; shifts of 0. @return false if the capacity is unknown. */
 bool taper_learn_first(const taper_learn_t *learn, taper_learn_shift_t *shift);
 
 /** What its samples alone say. @return false if they are too few to say anything, or the capacity is unknown. */
 bool taper_learn_shown(const taper_learn_t *learn, taper_learn_shift_t *shift);
 
-/** Hold this shift of what was told for its first guess. No effect once that has proved wrong. The noise counts before looks. */
+/** Hold this shift of what was told for its first guess. No effect once that has proved wrong. */
 void taper_learn_assume(taper_learn_t *learn, const taper_learn_shift_t *shift);
+
+/** The deviation of a measurement, as a share of it. @return false as long as that rests on a few looks. */
+bool taper_learn_noise(const taper_learn_t *learn, taper_real_t *noise);
+
+/** Hold that for it, as if looks had shown it. No effect after looks. */
+void taper_learn_assume_noise(taper_learn_t *learn, taper_real_t noise);
 
 /** Take a look into account. Energies or powers that are negative are ignored. */
 void taper_learn_take(taper_learn_t *learn, const taper_learn_sample_t *sample);
