@@ -23,9 +23,9 @@
 #define CLIP  ((taper_real_t)3)
 #define DRIFT ((taper_real_t)0.5)
 #define WRONG ((taper_real_t)12)
-/* A vehicle that takes all it may, so many deviations above the line, lifts it; so far off, above or below, counts at once. */
-#define LIFTS ((taper_real_t)3)
-#define LEAPS ((taper_real_t)4)
+/* A vehicle that takes so many deviations more than the line, or less than it may, has shown that at once: no noise does that, even
+   if its deviation is taken for half of what it is. */
+#define LEAPS ((taper_real_t)8)
 /* So many deviations less than an offer are not held against a vehicle that follows it. */
 #define SPARED ((taper_real_t)1)
 /* An offer so far above the line is refused, if the line is right. */
@@ -168,13 +168,14 @@ void taper_learn_assume_noise(taper_learn_t *learn, taper_real_t noise) {
     }
 }
 
-/* The line was wrong: from here on by this sample, its fall in doubt as at first. */
+/* The line was wrong: from here on by this sample, its fall in doubt as at first. Its noise had a part in choosing it, so it
+   counts for two deviations. */
 static void begin_anew(taper_learn_t *learn, const taper_learn_sums_t *line, taper_real_t energy,
                        taper_real_t power) {
     learn->guess = (taper_learn_guess_t){.centre = energy,
                                          .level = power,
                                          .fall = fall_of(line),
-                                         .level_variance = square(noise_of(learn, learn->peak, 0)),
+                                         .level_variance = square(2 * noise_of(learn, learn->peak, 0)),
                                          .fall_variance = learn->told.fall_variance};
     learn->samples = (taper_learn_sums_t){.weight = 0};
     learn->rises = 0;
@@ -205,12 +206,15 @@ static bool is_wrong(taper_learn_t *learn, taper_real_t residual) {
     return learn->rises > WRONG || learn->falls > WRONG;
 }
 
+/* A line that lies below what the vehicle takes by so much is left at once: what was drawn is possible. */
 static void fit(taper_learn_t *learn, const taper_learn_sums_t *line, taper_real_t energy, taper_real_t power,
-                taper_real_t residual) {
+                taper_real_t noise) {
     const taper_real_t huber = (taper_real_t)TAPER_LEARN_HUBER;
+    const taper_real_t higher = power - limit_at(line, energy);
+    const taper_real_t residual = higher / (noise * sqrt(1 + doubt_at(line, energy)));
     const taper_real_t size = fabs(residual);
     learn->knows = true;
-    if (is_wrong(learn, residual)) {
+    if (is_wrong(learn, residual) || higher > LEAPS * noise) {
         begin_anew(learn, line, energy, power);
     } else {
         add(learn, energy, power, size > huber ? huber / size : 1);
@@ -232,15 +236,6 @@ static void watch_noise(taper_learn_t *learn, taper_real_t limit, taper_real_t p
         move_noise(learn, fabs(strays - learn->strayed) > NOISE_MEDIAN * learn->noise);
     }
     learn->strayed = strays;
-}
-
-/* A vehicle that takes all: its limit is at least this. */
-static void lift(taper_learn_t *learn, taper_real_t energy, taper_real_t power, taper_real_t noise) {
-    const taper_learn_sums_t line = line_of(learn);
-    if (limit_at(&line, energy) < power - LEAPS * noise) {
-        learn->knows = true;
-        begin_anew(learn, &line, energy, power);
-    }
 }
 
 /*
@@ -273,14 +268,10 @@ void taper_learn_take(taper_learn_t *learn, const taper_learn_sample_t *sample) 
     const taper_learn_sums_t line = line_of(learn); /* the guess weighs by the noise */
     const taper_real_t noise = noise_of(learn, power, kilo(taper_max_i32(sample->step_W, 0)));
     const taper_real_t limit = limit_at(&line, energy);
-    const taper_real_t residual = (power - limit) / (noise * sqrt(1 + doubt_at(&line, energy)));
-    if (offered > limit + CLEAR * noise || residual >= LIFTS) {
-        fit(learn, &line, energy, power, residual);
+    if (offered > limit + CLEAR * noise) {
+        fit(learn, &line, energy, power, noise);
     } else if (offered > 0) {
         watch_shortfall(learn, &line, energy, power, (taper_real_min(limit, offered) - power) / noise);
-    }
-    if (!sample->limits) {
-        lift(learn, energy, power, noise);
     }
 }
 

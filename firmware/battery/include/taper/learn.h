@@ -11,8 +11,9 @@
  * know better). It weighs by its doubt against the noise of the samples, so it holds as long as, and as far as, these do not
  * know better.
  *
- * - **Both sides.** A vehicle that takes less than it could shows its limit. One that takes all shows only that its limit is
- *   not less: that lifts a line that lies below, and lowers none.
+ * - **Both sides.** Of an offer that is clear of the line all that is drawn is a sample. Of one that is not, a reading that is
+ *   lower may be noise, and to choose by noise would pull the line down, and offers after it: only several in a row, or
+ *   one that no noise explains, show a limit. An offer that is taken shows nothing.
  * - **Outliers.** A residual counts by the deviation that is expected at its energy, so that a poor line doubts itself before
  *   it doubts a sample; beyond TAPER_LEARN_HUBER of these its weight falls (Huber).
  * - **Change.** Residuals that lie on one side in a row (a CUSUM) show that the line is wrong: a wrong first guess, or the knee
@@ -79,8 +80,8 @@ typedef struct {
     int32_t energy_Wh; /**< charged since the session began */
     int32_t power_W;   /**< that it draws */
     int32_t step_W;    /**< resolution of that, >= 0 */
-    int32_t offered_W; /**< most that it may draw, for long enough; 0: that has changed just now */
-    bool limits; /**< it could take more and does not: this is its limit. Else its limit is at least this */
+    int32_t
+        offered_W; /**< most that it may draw, for long enough; 0: that has changed just now, and nothing is shown */
 } taper_learn_sample_t;
 
 /** Begin with what `told` says, at `energy_Wh` of its session. Cost: constant, like that of all calls here. */
