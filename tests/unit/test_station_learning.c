@@ -165,7 +165,7 @@ static void test_the_next_vehicle_begins_with_what_it_tells_and_what_was_seen(vo
     pass(10 * MINUTE, AMPLE_W);
     TEST_ASSERT_INT32_WITHIN(100, 6000, taper_battery_limit_W(demand()));
     plug(10800, 0.0);
-    pass(5, AMPLE_W);
+    pass(5, SCARCE_W);
     const int32_t limit_W = taper_battery_limit_W(demand());
     TEST_ASSERT_TRUE(limit_W > 6200 && limit_W < TOLD_W - 200); /* one is no proof */
 }

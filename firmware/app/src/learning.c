@@ -155,19 +155,18 @@ void taper_learning_look(taper_station_t *station, uint8_t i, int32_t measured_m
     tell_planner(station, learning, demand, energy_Wh);
 }
 
-/** Whether the line may well be wrong by the margin, which is two deviations. */
-static bool is_in_doubt(const taper_station_t *station, uint8_t i, int32_t limit_W) {
-    const taper_learning_t *learning = &station->learning[i];
+/** By what the line may well be wrong: two deviations. */
+static int32_t doubt_W(const taper_station_t *station, uint8_t i) {
     const int32_t energy_Wh = station->sessions.session[i].session_Wh;
-    const int32_t deviation_W = taper_learn_deviation_W(&learning->line, energy_Wh);
-    return deviation_W >= margin_W(learning, &station->snapshot.demand[i], limit_W) / 2;
+    return taper_saturate_i32(2 * (int64_t)taper_learn_deviation_W(&station->learning[i].line, energy_Wh));
 }
 
 /** Whether it is time to offer more than the line at the expense of others. An offer that others' limits keep down shows nothing:
     it ends after its time as well. */
 static bool is_due(const taper_station_t *station, uint8_t i, taper_learning_t *learning, int32_t limit_W) {
     const uint32_t now_ms = station->snapshot.now_ms;
-    const uint32_t rests = is_in_doubt(station, i, limit_W) ? RESTS_IN_DOUBT : RESTS_IF_KNOWN;
+    const bool in_doubt = doubt_W(station, i) >= margin_W(learning, &station->snapshot.demand[i], limit_W);
+    const uint32_t rests = in_doubt ? RESTS_IN_DOUBT : RESTS_IF_KNOWN;
     const uint32_t lasts_ms = learning->rests ? rests * show_ms(station) : RISE_ms + show_ms(station);
     if (taper_elapsed_ms(now_ms, learning->since_ms) >= lasts_ms) {
         learning->rests = !learning->rests;
@@ -180,7 +179,7 @@ static bool is_due(const taper_station_t *station, uint8_t i, taper_learning_t *
 /**
  * An offer that is just the line would never be refused, and so never show that the line is too low. So where the vehicle is
  * to get all that it takes, it is offered a margin more: now and then before others, and else of what is left if all have all that
- * is of use to them. @return how much of that.
+ * is of use to them: of that as much as the line may be too low. @return how much of that.
  */
 static int32_t probe(taper_station_t *station, uint8_t i, int32_t left_W) {
     taper_learning_t *learning = &station->learning[i];
@@ -193,8 +192,10 @@ static int32_t probe(taper_station_t *station, uint8_t i, int32_t left_W) {
     }
     const int32_t more_W = taper_min_i32(margin_W(learning, demand, limit_W), allowed_W - limit_W);
     if (more_W <= left_W) {
-        proposal->ceiling_W[i] = limit_W + more_W;
-        return more_W;
+        const int32_t most_W = taper_min_i32(taper_max_i32(more_W, doubt_W(station, i)), allowed_W - limit_W);
+        const int32_t taken_W = taper_min_i32(most_W, left_W);
+        proposal->ceiling_W[i] = limit_W + taken_W;
+        return taken_W;
     }
     if (proposal->wish_W[i] >= part(limit_W, ALL_permille) && is_due(station, i, learning, limit_W)) {
         proposal->wish_W[i] = proposal->ceiling_W[i] = limit_W + more_W;
