@@ -162,12 +162,12 @@ static void test_a_pause_of_the_vehicle_is_no_limit(void) {
 static void test_the_next_vehicle_begins_with_what_it_tells_and_what_was_seen(void) {
     start(true);
     plug(6000, 0.0);
-    pass(10 * MINUTE, AMPLE_W);
+    pass(20 * MINUTE, AMPLE_W);
     TEST_ASSERT_INT32_WITHIN(100, 6000, taper_battery_limit_W(demand()));
     plug(10800, 0.0);
     pass(5, SCARCE_W);
     const int32_t limit_W = taper_battery_limit_W(demand());
-    TEST_ASSERT_TRUE(limit_W > 6200 && limit_W < TOLD_W - 200); /* one is no proof */
+    TEST_ASSERT_INT32_WITHIN(500, 7000, limit_W); /* one is no proof */
 }
 
 static void test_among_vehicles_that_tell_the_same_wrong_thing_the_fifth_is_known(void) {
