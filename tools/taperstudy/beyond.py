@@ -101,8 +101,8 @@ def learned() -> Topic:
         "learned", "The taper learned on line",
         "soc-mpc-learned is told no taper, and learns it from what vehicles accept. soc-mpc --learn-taper takes what is "
         "told as a first guess. Meters with noise; tapers told wrong, by a factor between 0.5 and 1.5 that is drawn for "
-        "each vehicle. The paper's day has one look at a vehicle in 15 minutes; a station has one each second, and ticks of 60 s are "
-        "nearer to that.",
+        "each vehicle. The paper's day has one look at a vehicle in 15 minutes; a station has one each second, and ticks of "
+        "60 s are nearer to that.",
         tuple(settings), ("mpc", "edf-soc", "llf", "soc-mpc", *LEARNING))
 
 

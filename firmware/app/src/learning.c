@@ -12,8 +12,8 @@
 #define MARGIN_deviations 3
 #define MARGIN_mA         300
 #define MOST_DOUBLINGS    6
-/** A vehicle is offered more, at the expense of others, for so long from when it has limited itself, or for a tick that is longer [ms].
-    Then it rests: so many times as long if its line may be wrong by the margin here, or else. */
+/** A vehicle is offered more, at the expense of others, for so long from when it has limited itself, or for a tick that is
+    longer [ms]. Then it rests: so many times as long, if its line may be wrong by the margin here, or if not. */
 #define SHOW_ms        UINT32_C(30000)
 #define RESTS_IN_DOUBT 2
 #define RESTS_IF_KNOWN 20
@@ -178,8 +178,8 @@ static bool is_due(const taper_station_t *station, uint8_t i, taper_learning_t *
 
 /**
  * An offer that is just the line would never be refused, and so never show that the line is too low. So where the vehicle is
- * to get all that it takes, it is offered a margin more: now and then before others, and else of what is left if all have all that
- * is of use to them: of that as much as the line may be too low. @return how much of that.
+ * to get all that it takes, it is offered a margin more: now and then before others, and else of what is left if all have all
+ * that is of use to them, then as much as the line may be too low. @return how much of that.
  */
 static int32_t probe(taper_station_t *station, uint8_t i, int32_t left_W) {
     taper_learning_t *learning = &station->learning[i];

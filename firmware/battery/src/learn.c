@@ -23,8 +23,8 @@
 #define CLIP  ((taper_real_t)3)
 #define DRIFT ((taper_real_t)0.5)
 #define WRONG ((taper_real_t)12)
-/* A vehicle that takes so many deviations more than the line, or less than it may, has shown that at once: no noise does that, even
-   if its deviation is taken for half of what it is. */
+/* A vehicle that takes so many deviations more than the line, or less than it may, has shown that at once: no noise does that,
+   even if its deviation is taken for half of what it is. */
 #define LEAPS ((taper_real_t)8)
 /* So many deviations less than an offer are not held against a vehicle that follows it. */
 #define SPARED ((taper_real_t)1)

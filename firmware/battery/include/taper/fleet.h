@@ -2,14 +2,15 @@
  * What the vehicles of a station have in common: a first guess of the taper of the next one, better than what it tells.
  *
  * Model: vehicles differ from what they tell by a shift (taper/learn.h) that is normal, with a mean and a variance that are
- * the station's own. Both are learned from vehicles whose lines are known, each counted once, with fixed memory: at most
+ * the station's own. Both are learned from vehicles whose lines are known, each counted once, in fixed memory: at most
  * TAPER_FLEET_MOST weigh in full, older ones fade. The mean begins at no shift, and the variance at the doubt in what a
- * stranger tells, which weighs as one vehicle. So where vehicles are alike the guess is good after a few of them, and nearly as good
- * as a measurement after many; where they are not, it is their mean, in as much doubt as they differ. One that differs by more than
- * TAPER_LEARN_HUBER deviations counts less.
+ * stranger tells, which weighs as one vehicle. So where vehicles are alike the guess is good after a few of them; where they
+ * are not, it is their mean, in as much doubt as they differ. One that differs by more than TAPER_LEARN_HUBER deviations
+ * counts less.
  *
  * Those that tell a taper and those that tell none are two fleets. Vehicles of unknown capacity belong to none: their lines
- * cannot be compared. The noise of the station's meters is taken from all. One whose line is flat at first and falls later is counted by what it showed first.
+ * cannot be compared. One whose line is flat at first and falls later is counted by what it showed first. The noise of the
+ * station's meters is taken from all.
  *
  * Source: shrinkage of a normal mean (empirical Bayes).
  */
