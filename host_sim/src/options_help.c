@@ -22,7 +22,7 @@ const char sim_options_help[] =
     "until "
     "the next one, the first one before its time too.\n"
     "\n"
-    "TAPERS CSV: session_id, share of the charge, learned (some sample showed it) and sure (to 2.5 %) 0 or "
+    "TAPERS CSV: session_id, share of the charge, learned (by samples or the fleet) and sure (to 2.5 %) 0 or "
     "1, limit by the station and the vehicle's own "
     "[kW], at that energy and at the end of the charge, and error: the greater difference of the two, as a "
     "share of max_kw.\n"

@@ -87,8 +87,7 @@ static void look(double offered_W) {
     const taper_learn_sample_t sample = {.energy_Wh = (int32_t)(trial.energy_Wh / 10.0) * 10,
                                          .power_W = measured_W(seen_W),
                                          .step_W = STEP_mA * VOLTS / 1000,
-                                         .offered_W = (int32_t)offered_W,
-                                         .limits = draws_W < offered_W * 0.97 - 50.0 || outlier};
+                                         .offered_W = (int32_t)offered_W};
     taper_learn_take(&trial.learn, &sample);
     trial.energy_Wh += draws_W * scene->period_s / 3600.0;
 }
@@ -213,6 +212,42 @@ static void test_a_vehicle_that_takes_all_it_may_lowers_nothing(void) {
     TEST_ASSERT_INT32_WITHIN(1, 7000, taper_learn_limit_W(&trial.learn, (int32_t)trial.energy_Wh));
 }
 
+static void test_noise_of_offers_that_are_taken_whole_lowers_nothing(void) {
+    scene_t scene = plain;
+    scene.noise = 0.05;
+    for (uint32_t seed = 1; seed <= TRIALS; seed++) {
+        begin(&scene, seed);
+        charge_to(0.02);
+        for (unsigned k = 0; k < 3600; k++) {
+            look(fmin(taper_learn_limit_W(&trial.learn, (int32_t)trial.energy_Wh), limit_W(trial.energy_Wh)));
+        }
+        const double now_W = taper_learn_limit_W(&trial.learn, (int32_t)trial.energy_Wh);
+        TEST_ASSERT_TRUE(now_W >= 0.9 * limit_W(trial.energy_Wh));
+    }
+}
+
+static void test_a_vehicle_that_goes_on_taking_less_than_it_may_has_a_lower_limit(void) {
+    begin(&plain, 1);
+    trial.scene.peak_W = 6600;
+    for (unsigned k = 0; k < 60; k++) {
+        look(taper_learn_limit_W(&trial.learn, (int32_t)trial.energy_Wh));
+    }
+    TEST_ASSERT_INT32_WITHIN(150, 6600, taper_learn_limit_W(&trial.learn, (int32_t)trial.energy_Wh));
+}
+
+static void test_a_guess_weighs_by_the_noise_that_there_is(void) {
+    scene_t scene = plain;
+    scene.told_taper_W = scene.fall_per_h * scene.charge_Wh;
+    scene.noise = 0.05;
+    for (uint32_t seed = 1; seed <= TRIALS; seed++) {
+        begin(&scene, seed);
+        taper_learn_assume(&trial.learn, &(taper_learn_shift_t){.level_variance = (taper_real_t)0.0004,
+                                                                .fall_variance = (taper_real_t)0.0016});
+        charge_to(0.02);
+        TEST_ASSERT_TRUE(error() <= 0.05); /* samples alone leave a multiple of that */
+    }
+}
+
 static void test_a_limit_that_rises_with_energy_is_taken_for_flat(void) {
     scene_t scene = plain;
     scene.fall_per_h = -0.1;
@@ -288,11 +323,8 @@ static void test_garbage_makes_no_nonsense(void) {
                                          .W_per_A = 230};
             taper_learn_begin(&trial.learn, &told, any());
         }
-        const taper_learn_sample_t sample = {.energy_Wh = any(),
-                                             .power_W = any(),
-                                             .step_W = any(),
-                                             .offered_W = any(),
-                                             .limits = uniform() < 0.5};
+        const taper_learn_sample_t sample = {
+            .energy_Wh = any(), .power_W = any(), .step_W = any(), .offered_W = any()};
         taper_learn_take(&trial.learn, &sample);
         const int32_t energy_Wh = any();
         taper_demand_t demand = {.active = true, .need_Wh = 1000, .capacity_Wh = 60000};
@@ -300,13 +332,16 @@ static void test_garbage_makes_no_nonsense(void) {
         TEST_ASSERT_TRUE(taper_learn_limit_W(&trial.learn, energy_Wh) >= 0);
         TEST_ASSERT_TRUE(demand.taper_W >= 0 && demand.peak_W >= 0);
         TEST_ASSERT_TRUE(taper_learn_noise_permille(&trial.learn) >= 10);
-        TEST_ASSERT_TRUE(isfinite((double)trial.learn.level) && isfinite((double)trial.learn.spread));
+        taper_learn_shift_t shown = {0};
+        if (taper_learn_shown(&trial.learn, &shown)) {
+            TEST_ASSERT_TRUE(isfinite((double)shown.level) && isfinite((double)shown.fall));
+        }
     }
 }
 
 static void test_a_line_that_was_never_begun_says_nothing(void) {
     trial = (trial_t){.random = 1};
-    taper_learn_take(&trial.learn, &(taper_learn_sample_t){.energy_Wh = 1, .power_W = 1, .limits = true});
+    taper_learn_take(&trial.learn, &(taper_learn_sample_t){.energy_Wh = 1, .power_W = 1, .offered_W = 2});
     TEST_ASSERT_FALSE(taper_learn_knows(&trial.learn));
     TEST_ASSERT_EQUAL_INT32(0, taper_learn_limit_W(&trial.learn, 0));
     TEST_ASSERT_FALSE(taper_learn_is_sure(&trial.learn, 0, 1000));
@@ -323,6 +358,9 @@ int main(void) {
     RUN_TEST(test_a_battery_that_was_flat_so_far_is_followed_round_its_knee);
     RUN_TEST(test_what_was_drawn_is_possible);
     RUN_TEST(test_a_vehicle_that_takes_all_it_may_lowers_nothing);
+    RUN_TEST(test_noise_of_offers_that_are_taken_whole_lowers_nothing);
+    RUN_TEST(test_a_vehicle_that_goes_on_taking_less_than_it_may_has_a_lower_limit);
+    RUN_TEST(test_a_guess_weighs_by_the_noise_that_there_is);
     RUN_TEST(test_a_limit_that_rises_with_energy_is_taken_for_flat);
     RUN_TEST(test_the_demand_gets_limit_and_slope_of_the_line);
     RUN_TEST(test_without_a_sample_the_demand_stays_as_told);

@@ -159,14 +159,51 @@ static void test_a_pause_of_the_vehicle_is_no_limit(void) {
     TEST_ASSERT_INT32_WITHIN(200, 9000, taper_battery_limit_W(demand()));
 }
 
-static void test_the_next_vehicle_begins_with_what_it_tells(void) {
+static void test_the_next_vehicle_begins_with_what_it_tells_and_what_was_seen(void) {
     start(true);
     plug(6000, 0.0);
-    pass(10 * MINUTE, AMPLE_W);
+    pass(20 * MINUTE, AMPLE_W);
     TEST_ASSERT_INT32_WITHIN(100, 6000, taper_battery_limit_W(demand()));
     plug(10800, 0.0);
-    pass(5, AMPLE_W);
-    TEST_ASSERT_INT32_WITHIN(50, TOLD_W, taper_battery_limit_W(demand()));
+    pass(5, SCARCE_W);
+    const int32_t limit_W = taper_battery_limit_W(demand());
+    TEST_ASSERT_INT32_WITHIN(500, 7000, limit_W); /* one is no proof */
+}
+
+static void test_among_vehicles_that_tell_the_same_wrong_thing_the_fifth_is_known(void) {
+    start(true);
+    for (unsigned k = 0; k < 4; k++) {
+        plug(6000, 0.1);
+        pass(20 * MINUTE, AMPLE_W);
+    }
+    plug(6000, 0.1);
+    pass(5, SCARCE_W);
+    TEST_ASSERT_INT32_WITHIN(300, 6000, taper_battery_limit_W(demand()));
+    TEST_ASSERT_FALSE(bench.station.learning[0].counted);
+}
+
+static void test_a_current_belongs_to_the_energy_at_which_it_began(void) {
+    start(true);
+    plug(6000, 0.1);
+    pass(10 * MINUTE, AMPLE_W);
+    const int32_t before_Wh = (int32_t)vehicle.energy_Wh;
+    const int32_t limit_W = taper_learn_limit_W(&bench.station.learning[0].line, before_Wh);
+    vehicle.energy_Wh += 1000.0; /* as if that tick had been a long one */
+    pass(1, AMPLE_W);
+    TEST_ASSERT_INT32_WITHIN(30, limit_W, taper_learn_limit_W(&bench.station.learning[0].line, before_Wh));
+}
+
+static void test_where_all_is_wanted_a_line_that_is_known_is_seldom_exceeded(void) {
+    start(true);
+    plug(6000, 0.0);
+    pass(20 * MINUTE, AMPLE_W);
+    unsigned above = 0;
+    for (unsigned k = 0; k < 20 * MINUTE; k++) {
+        pass(1, 6000);
+        above += bench.station.proposal.wish_W[0] > taper_battery_limit_W(demand()) ? 1 : 0;
+    }
+    TEST_ASSERT_TRUE(above > 0);
+    TEST_ASSERT_TRUE(above < 4 * MINUTE); /* to rise and to show takes a minute, then it rests for ten */
 }
 
 static void test_the_planner_hears_of_a_line_that_moved_but_not_all_the_time(void) {
@@ -189,7 +226,10 @@ int main(void) {
     RUN_TEST(test_a_line_that_is_too_high_follows_the_vehicle_down);
     RUN_TEST(test_a_site_that_has_little_to_give_teaches_nothing);
     RUN_TEST(test_a_pause_of_the_vehicle_is_no_limit);
-    RUN_TEST(test_the_next_vehicle_begins_with_what_it_tells);
+    RUN_TEST(test_the_next_vehicle_begins_with_what_it_tells_and_what_was_seen);
+    RUN_TEST(test_among_vehicles_that_tell_the_same_wrong_thing_the_fifth_is_known);
+    RUN_TEST(test_a_current_belongs_to_the_energy_at_which_it_began);
+    RUN_TEST(test_where_all_is_wanted_a_line_that_is_known_is_seldom_exceeded);
     RUN_TEST(test_the_planner_hears_of_a_line_that_moved_but_not_all_the_time);
     return UNITY_END();
 }

@@ -95,12 +95,14 @@ class LearningTopic(Topic):
 
 def learned() -> Topic:
     errors = (("exact", ()), ("meters wrong by 2 %", NOISE), ("taper told wrong by up to 50 %", WRONG_TAPER))
-    settings = [_varied(base, name, options) for base in (_day(), _week(WEEK)) for name, options in errors]
+    minutes = replace(_day(), name=f"{_day().name}, ticks of 60 s", tick_s=60.0)
+    settings = [_varied(base, name, options) for base in (_day(), minutes, _week(WEEK)) for name, options in errors]
     return LearningTopic(
         "learned", "The taper learned on line",
         "soc-mpc-learned is told no taper, and learns it from what vehicles accept. soc-mpc --learn-taper takes what is "
         "told as a first guess. Meters with noise; tapers told wrong, by a factor between 0.5 and 1.5 that is drawn for "
-        "each vehicle.",
+        "each vehicle. The paper's day has one look at a vehicle in 15 minutes; a station has one each second, and ticks of "
+        "60 s are nearer to that.",
         tuple(settings), ("mpc", "edf-soc", "llf", "soc-mpc", *LEARNING))
 
 

@@ -12,11 +12,11 @@
 #define MARGIN_deviations 3
 #define MARGIN_mA         300
 #define MOST_DOUBLINGS    6
-/** A vehicle is offered more for so long from when it has limited itself. Then what it could show waits for what others leave,
-    until it has rested, which a line that is sure does for longer [ms]. */
-#define SHOW_ms         UINT32_C(30000)
-#define REST_ms         UINT32_C(60000)
-#define REST_IF_SURE_ms UINT32_C(600000)
+/** A vehicle is offered more, at the expense of others, for so long from when it has limited itself, or for a tick that is
+    longer [ms]. Then it rests: so many times as long, if its line may be wrong by the margin here, or if not. */
+#define SHOW_ms        UINT32_C(30000)
+#define RESTS_IN_DOUBT 2
+#define RESTS_IF_KNOWN 20
 /** The planner is told of a line that has moved by this share of the vehicle's peak, at most so often. */
 #define MOVED_permille 50
 #define TELL_ms        UINT32_C(120000)
@@ -64,6 +64,12 @@ static bool took_more(const taper_learning_t *learning, const taper_demand_t *de
     return offered_W - limit_W > margin_W(learning, demand, limit_W) / 2;
 }
 
+/** How long a vehicle is offered more. */
+static uint32_t show_ms(const taper_station_t *station) {
+    const uint32_t tick_ms = station->options.config->tick_ms;
+    return tick_ms > SHOW_ms ? tick_ms : SHOW_ms;
+}
+
 /** It has limited itself: after a while of that it rests. */
 static void note_show(const taper_station_t *station, taper_learning_t *learning) {
     const uint32_t now_ms = station->snapshot.now_ms;
@@ -84,25 +90,25 @@ static void note_show(const taper_station_t *station, taper_learning_t *learning
 
 /** What it draws, against its line. One that draws next to nothing pauses, and shows nothing. */
 static void take_sample(taper_station_t *station, taper_learning_t *learning, const taper_demand_t *demand,
-                        int32_t energy_Wh, int32_t measured_mA, bool has_risen) {
+                        int32_t measured_mA, bool has_risen) {
     if (measured_mA == TAPER_ABSENT || measured_mA <= TAPER_DRAW_FLOWS_mA) {
         return;
     }
     const int32_t deviation = taper_learn_noise_permille(&learning->line);
     const int32_t less_mA = LESS_mA + part(measured_mA, LESS_deviations * deviation);
     const taper_learn_sample_t sample = {
-        .energy_Wh = energy_Wh,
+        .energy_Wh = learning->looked_Wh,
         /* EVSE_STATUS rounds up: the middle of its step. */
         .power_W = part(measured_mA - TAPER_CURRENT_STEP_mA / 2, demand->W_per_A),
         .step_W = part(TAPER_CURRENT_STEP_mA, demand->W_per_A),
         .offered_W = has_risen ? part(learning->settled_mA, demand->W_per_A) : 0,
-        .limits = measured_mA < learning->settled_mA - less_mA,
     };
-    const int32_t limit_W = taper_learn_limit_W(&learning->line, energy_Wh);
+    const int32_t limit_W = taper_learn_limit_W(&learning->line, learning->looked_Wh);
     taper_learn_take(&learning->line, &sample);
-    if (sample.limits) {
+    if (measured_mA < learning->settled_mA - less_mA) {
         note_show(station, learning);
     } else if (took_more(learning, demand, limit_W)) {
+        learning->since_ms = learning->rests ? learning->since_ms : station->snapshot.now_ms;
         learning->doublings = (uint8_t)taper_min_i32(learning->doublings + 1, MOST_DOUBLINGS);
     }
 }
@@ -117,6 +123,15 @@ static void tell_planner(taper_station_t *station, taper_learning_t *learning, c
     }
 }
 
+/** A vehicle gives the fleet what it has shown, once; until then it takes the fleet's guess. */
+static void ask_fleet(taper_station_t *station, taper_learning_t *learning) {
+    taper_fleet_watch(&station->fleet, &learning->line);
+    learning->counted = learning->counted || taper_fleet_count(&station->fleet, &learning->line);
+    if (!learning->counted) {
+        taper_fleet_advise(&station->fleet, &learning->line);
+    }
+}
+
 void taper_learning_look(taper_station_t *station, uint8_t i, int32_t measured_mA) {
     taper_learning_t *learning = &station->learning[i];
     taper_demand_t *demand = &station->snapshot.demand[i];
@@ -125,56 +140,86 @@ void taper_learning_look(taper_station_t *station, uint8_t i, int32_t measured_m
         return;
     }
     if (learning->session != demand->session) {
-        *learning = (taper_learning_t){.session = demand->session};
+        *learning =
+            (taper_learning_t){.session = demand->session,
+                               .looked_Wh = energy_Wh,
+                               .rests = true,
+                               .since_ms = station->snapshot.now_ms - RESTS_IN_DOUBT * show_ms(station)};
         taper_learn_begin(&learning->line, demand, energy_Wh);
     }
+    ask_fleet(station, learning);
     const bool has_risen = follow_offer(station, i, learning);
-    take_sample(station, learning, demand, energy_Wh, measured_mA, has_risen);
+    take_sample(station, learning, demand, measured_mA, has_risen);
+    learning->looked_Wh = energy_Wh;
     taper_learn_apply(&learning->line, energy_Wh, demand);
     tell_planner(station, learning, demand, energy_Wh);
 }
 
-/** Whether it is time to offer more than the line at the expense of others. */
-static bool is_due(const taper_station_t *station, taper_learning_t *learning, bool sure) {
-    const uint32_t rested_ms = taper_elapsed_ms(station->snapshot.now_ms, learning->since_ms);
-    if (learning->rests && rested_ms >= (sure ? REST_IF_SURE_ms : REST_ms)) {
-        learning->rests = false;
+/** By what the line may well be wrong: two deviations. */
+static int32_t doubt_W(const taper_station_t *station, uint8_t i) {
+    const int32_t energy_Wh = station->sessions.session[i].session_Wh;
+    return taper_saturate_i32(2 * (int64_t)taper_learn_deviation_W(&station->learning[i].line, energy_Wh));
+}
+
+/** Whether it is time to offer more than the line at the expense of others. An offer that others' limits keep down shows nothing:
+    it ends after its time as well. */
+static bool is_due(const taper_station_t *station, uint8_t i, taper_learning_t *learning, int32_t limit_W) {
+    const uint32_t now_ms = station->snapshot.now_ms;
+    const bool in_doubt = doubt_W(station, i) >= margin_W(learning, &station->snapshot.demand[i], limit_W);
+    const uint32_t rests = in_doubt ? RESTS_IN_DOUBT : RESTS_IF_KNOWN;
+    const uint32_t lasts_ms = learning->rests ? rests * show_ms(station) : RISE_ms + show_ms(station);
+    if (taper_elapsed_ms(now_ms, learning->since_ms) >= lasts_ms) {
+        learning->rests = !learning->rests;
         learning->shown = false;
+        learning->since_ms = now_ms;
     }
     return !learning->rests;
 }
 
 /**
  * An offer that is just the line would never be refused, and so never show that the line is too low. So where the vehicle is
- * to get all that it takes, it is offered a margin more: of what others leave while its line is not sure, and now and then
- * before others.
+ * to get all that it takes, it is offered a margin more: now and then before others, and else of what is left if all have all
+ * that is of use to them, then as much as the line may be too low. @return how much of that.
  */
-static void probe(taper_station_t *station, uint8_t i) {
+static int32_t probe(taper_station_t *station, uint8_t i, int32_t left_W) {
     taper_learning_t *learning = &station->learning[i];
     const taper_demand_t *demand = &station->snapshot.demand[i];
     taper_proposal_t *proposal = &station->proposal;
     const int32_t limit_W = taper_battery_limit_W(demand);
     const int32_t allowed_W = taper_demand_allowed_W(demand);
     if (limit_W >= allowed_W || proposal->ceiling_W[i] < limit_W) {
-        return;
+        return 0;
     }
-    const int32_t energy_Wh = station->sessions.session[i].session_Wh;
-    const bool sure = taper_learn_is_sure(&learning->line, energy_Wh, demand->need_Wh);
-    const bool due = is_due(station, learning, sure);
     const int32_t more_W = taper_min_i32(margin_W(learning, demand, limit_W), allowed_W - limit_W);
-    if (due && proposal->wish_W[i] >= part(limit_W, ALL_permille)) {
-        proposal->wish_W[i] = limit_W + more_W;
+    if (more_W <= left_W) {
+        const int32_t most_W = taper_min_i32(taper_max_i32(more_W, doubt_W(station, i)), allowed_W - limit_W);
+        const int32_t taken_W = taper_min_i32(most_W, left_W);
+        proposal->ceiling_W[i] = limit_W + taken_W;
+        return taken_W;
     }
-    if (due || !sure) {
-        proposal->ceiling_W[i] = limit_W + more_W;
+    if (proposal->wish_W[i] >= part(limit_W, ALL_permille) && is_due(station, i, learning, limit_W)) {
+        proposal->wish_W[i] = proposal->ceiling_W[i] = limit_W + more_W;
     }
+    return 0;
+}
+
+/** What the site has left if all get all that is of use to them; negative: there is not enough. */
+static int32_t left_W(const taper_station_t *station) {
+    int64_t sum_W = 0;
+    for (uint8_t i = 0; i < station->snapshot.count; i++) {
+        if (station->snapshot.demand[i].active) {
+            sum_W += taper_max_i32(station->proposal.wish_W[i], station->proposal.ceiling_W[i]);
+        }
+    }
+    return taper_saturate_i32(station->limit_now.supply.site_W - sum_W);
 }
 
 void taper_learning_probe(taper_station_t *station) {
+    int32_t rest_W = left_W(station);
     for (uint8_t i = 0; i < station->snapshot.count; i++) {
         if (station->snapshot.demand[i].active &&
             station->learning[i].session == station->snapshot.demand[i].session) {
-            probe(station, i);
+            rest_W -= probe(station, i, rest_W);
         }
     }
 }

@@ -21,6 +21,7 @@
 #include "taper/e2e.h"
 #include "taper/event.h"
 #include "taper/fallback.h"
+#include "taper/fleet.h"
 #include "taper/learn.h"
 #include "taper/ledger.h"
 #include "taper/limits.h"
@@ -153,7 +154,9 @@ typedef struct {
     uint8_t doublings;  /**< of the margin: offers above the line were taken whole so many times in a row */
     bool shown;         /**< it has limited itself since it is offered more */
     bool rests;         /**< it is offered no more than the line */
+    int32_t looked_Wh;  /**< energy charged at the last look: what it has drawn since began there */
     int32_t settled_mA; /**< of what it is offered, what it had time to rise to */
+    bool counted;       /**< among the fleet */
     uint32_t since_ms;  /**< `rests`, or else `shown` holds, in the world's time */
 } taper_learning_t;
 
@@ -183,6 +186,7 @@ typedef struct {
     taper_conductors_t conductors[TAPER_MAX_CONNECTORS];
     taper_learning_t
         learning[TAPER_MAX_CONNECTORS]; /**< where the configuration says that tapers are learned */
+    taper_fleet_t fleet;                /**< and what they have in common */
     uint32_t learned_ms;                /**< when the planner was last told that a line has moved; 0: never */
     taper_health_t health;              /**< of the planner */
     taper_self_t self;                  /**< of this controller */
