@@ -93,7 +93,8 @@ typedef struct {
 
     bool sent_counter_known;
     uint8_t sent_counter;
-    int32_t sent_mA; /**< in the last setpoint that the bus took */
+    int32_t sent_mA;         /**< in the last setpoint that the bus took */
+    uint8_t sent_conductors; /**< that its phase mask allows: where it counts, whatever the vehicle does */
     int64_t sent_ms;
 
     bool told_vehicle; /**< by the last EVSE_STATUS that reached the station */

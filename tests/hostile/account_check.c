@@ -181,13 +181,6 @@ void account_check(account_t *account) {
     }
 }
 
-/** By the conductors that the station has to believe in: fewer than the connector has only where it said so. */
-static unsigned conductors_told(const account_t *account, unsigned connector) {
-    const unsigned wired = account->config->connectors[connector].phases;
-    const unsigned told = account->book[connector].told_conductors;
-    return told < wired ? told : wired;
-}
-
 void account_tick(account_t *account, bool all_taken) {
     loads_t sent;
     account->ticked_ms = account->now_ms;
@@ -195,7 +188,7 @@ void account_tick(account_t *account, bool all_taken) {
     for (unsigned i = 0; i < account->config->connector_count; i++) {
         account->book[i].tick_conductors = account->book[i].told_conductors;
         all_taken = all_taken && account->now_ms - account->book[i].sent_ms <= SENT_LATELY_ms;
-        add_equally(&sent, account, i, conductors_told(account, i), account->book[i].sent_mA);
+        add_equally(&sent, account, i, account->book[i].sent_conductors, account->book[i].sent_mA);
     }
     for (unsigned group = 0; all_taken && group < account->config->group_count; group++) {
         const double limit_mA = account->config->groups[group].imbalance_mA;

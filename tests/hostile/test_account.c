@@ -178,6 +178,22 @@ static void test_setpoints_of_phases_that_differ_too_much_are_a_violation(void) 
     bench_objects(RULE_IMBALANCE_A);
 }
 
+static void test_a_setpoint_for_one_of_three_phases_is_held_against_the_other_two(void) {
+    bench_start(SOCKETS);
+    taper_frame_t frame = bench_frame_with(6, 20000, 48, 3, 1); /* on L2: its wiring is 213 */
+    account_sent(&account, &frame);
+    account_tick(&account, true);
+    bench_content();
+    frame = bench_frame_with(6, 20100, 48, 3, 7); /* on all three */
+    account_sent(&account, &frame);
+    account_tick(&account, true);
+    bench_content();
+    frame = bench_frame_with(6, 20100, 48, 3, 1);
+    account_sent(&account, &frame);
+    account_tick(&account, true);
+    bench_objects(RULE_IMBALANCE_A);
+}
+
 static void test_pairs_load_the_delta_side_of_their_transformer(void) {
     bench_start(LINES);
     bench_setpoint(0, 32000, 0); /* L1-L2 */
@@ -254,6 +270,7 @@ int main(void) {
     RUN_TEST(test_fallback_currents_beyond_the_failsafe_limit_are_one);
     RUN_TEST(test_a_failsafe_limit_that_fell_leaves_five_seconds_to_who_can_be_reached);
     RUN_TEST(test_setpoints_of_phases_that_differ_too_much_are_a_violation);
+    RUN_TEST(test_a_setpoint_for_one_of_three_phases_is_held_against_the_other_two);
     RUN_TEST(test_pairs_load_the_delta_side_of_their_transformer);
     RUN_TEST(test_what_is_really_drawn_has_to_come_back_within_25_seconds);
     RUN_TEST(test_over_draw_that_nobody_can_see_is_not_held_against_the_station);
