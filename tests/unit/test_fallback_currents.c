@@ -346,23 +346,36 @@ static void test_who_cannot_be_reached_and_is_told_the_same_again_takes_nothing_
     assert_chosen(10000, 10000, 8000, 0);
 }
 
-static void test_those_who_cannot_be_reached_are_told_no_more_than_fits_for_when_they_can(void) {
+static void test_who_cannot_be_reached_and_is_told_less_frees_nothing_before_he_is_heard(void) {
     choose(W_of_dA(340));
     send_and_echo_all();
     now_ms += EXPIRED_ms;
     taper_ledger_update(&ledger, now_ms);
-    choose(W_of_dA(160));
-    assert_chosen(10000, 6000, 0, 0);
+    for (uint8_t i = 1; i < 4; i++) { /* the first one hears nothing, and keeps 10 A */
+        send(i);
+        echo(i);
+    }
+    granted.current_mA[0] = 6000;
+    choose(W_of_dA(300));
+    assert_chosen(6000, 10000, 8000, 0);
 }
 
-static void test_beside_those_who_cannot_be_reached_nothing_is_added_while_they_hold_more_than_the_limit(
+static void test_while_those_who_may_be_out_of_reach_hold_more_than_the_limit_whoever_is_reached_gives_up(
     void) {
-    connectors[0].fallback_mA = 7499;
-    taper_ledger_init(&ledger, &config, VALIDITY_ms, 1, now_ms); /* may have been told in an earlier life */
-    connectors[0].fallback_mA = 7500;
-    taper_ledger_sent(&ledger, 0, 0, 32000, 7500, now_ms);
-    choose(W_of_dA(75));
-    assert_chosen(7000, 0, 0, 0);
+    choose(W_of_dA(340));
+    send_and_echo_all();
+    now_ms += EXPIRED_ms; /* a bus that was off for so long */
+    taper_ledger_update(&ledger, now_ms);
+    for (uint8_t i = 0; i < 2; i++) {
+        choose(W_of_dA(160));
+        assert_chosen(0, 0, 0, 0);
+        send(i);
+        echo(i);
+    }
+    choose(W_of_dA(140) - 1);
+    assert_chosen(0, 0, 0, 0);
+    choose(W_of_dA(140)); /* what the other two hold fits by now */
+    assert_chosen(0, 0, 8000, 6000);
 }
 
 int main(void) {
@@ -387,7 +400,7 @@ int main(void) {
     RUN_TEST(test_whatever_happens_the_sum_is_within_a_constant_limit);
     RUN_TEST(test_when_the_failsafe_limit_falls_who_can_be_reached_gives_up_for_who_cannot);
     RUN_TEST(test_who_cannot_be_reached_and_is_told_the_same_again_takes_nothing_more);
-    RUN_TEST(test_those_who_cannot_be_reached_are_told_no_more_than_fits_for_when_they_can);
-    RUN_TEST(test_beside_those_who_cannot_be_reached_nothing_is_added_while_they_hold_more_than_the_limit);
+    RUN_TEST(test_who_cannot_be_reached_and_is_told_less_frees_nothing_before_he_is_heard);
+    RUN_TEST(test_while_those_who_may_be_out_of_reach_hold_more_than_the_limit_whoever_is_reached_gives_up);
     return UNITY_END();
 }

@@ -38,23 +38,19 @@ static int32_t stuck_mA(const choice_t *choice, uint8_t i) {
     return choice->ledger->entry[i].over_fallback_mA;
 }
 
-/** What is left of the failsafe limit: by what everybody is told, and beside what is stuck. */
-typedef struct {
-    int64_t told_mW, beside_mW; /**< the latter can be negative: the limit fell */
-} budget_t;
-
-/** Tell it again what it was told last, as far as all of these fit together, and beside what is stuck. */
-static void keep(const choice_t *choice, uint8_t i, budget_t *budget) {
+/**
+ * Tell it again what it was told last, as far as `beside_mW` has room, which is left of the failsafe limit beside all that is
+ * stuck. While that is more than the limit nobody is told any: whoever can be reached has to give up for who cannot.
+ */
+static void keep(const choice_t *choice, uint8_t i, int64_t *beside_mW) {
     const int32_t W_per_A = weight_W_per_A(choice, i);
     const int32_t paid_mA = stuck_mA(choice, i);
-    const int32_t more_mA = taper_max_i32(held_mA(budget->beside_mW, W_per_A), 0);
-    const int32_t beside_mA = taper_saturate_i32((int64_t)paid_mA + more_mA);
-    const int32_t most_mA = taper_min_i32(held_mA(budget->told_mW, W_per_A), beside_mA);
+    const int32_t most_mA =
+        *beside_mW < 0 ? 0 : taper_saturate_i32((int64_t)paid_mA + held_mA(*beside_mW, W_per_A));
     const int32_t last_mA = taper_min_i32(wanted_mA(choice, i), choice->ledger->entry[i].last_fallback_mA);
     const int32_t kept_mA = whole_or_none_mA(choice, i, taper_min_i32(last_mA, most_mA));
     choice->fallback->current_mA[i] = kept_mA;
-    budget->told_mW -= (int64_t)W_per_A * kept_mA;
-    budget->beside_mW -= (int64_t)W_per_A * taper_max_i32(kept_mA - paid_mA, 0);
+    *beside_mW -= (int64_t)W_per_A * taper_max_i32(kept_mA - paid_mA, 0);
 }
 
 static int32_t booked_mA(const choice_t *choice, uint8_t i) {
@@ -78,16 +74,16 @@ void taper_ledger_grant_fallback(const taper_ledger_t *ledger, const taper_stati
                                  taper_setpoints_t *fallback) {
     const choice_t choice = {ledger, config, snapshot, rows, granted, fallback};
     const int64_t failsafe_mW = (int64_t)taper_max_i32(failsafe_W, 0) * 1000;
-    budget_t budget = {.told_mW = failsafe_mW, .beside_mW = failsafe_mW};
+    int64_t beside_mW = failsafe_mW;
     int64_t room_mW = failsafe_mW;
     for (uint8_t i = 0; i < config->connector_count; i++) {
         fallback->current_mA[i] = 0;
-        budget.beside_mW -= (int64_t)weight_W_per_A(&choice, i) * stuck_mA(&choice, i);
+        beside_mW -= (int64_t)weight_W_per_A(&choice, i) * stuck_mA(&choice, i);
     }
     for (uint8_t place = 0; place < config->connector_count; place++) {
         /* A rank binds nobody: it may name a connector twice, or one that there is not. */
         if (rank[place] < config->connector_count && fallback->current_mA[rank[place]] == 0) {
-            keep(&choice, rank[place], &budget);
+            keep(&choice, rank[place], &beside_mW);
         }
     }
     for (uint8_t i = 0; i < config->connector_count; i++) {

@@ -136,7 +136,8 @@ void taper_ledger_grant(const taper_ledger_t *ledger, const taper_station_config
  * Choose the fallback current that goes with each setpoint: in the order of `rank` the configured one, never above what is
  * granted, at least the minimum current or nothing, in steps of TAPER_FALLBACK_STEP_mA. The sum of the power of all that connectors may
  * have been told stays within `failsafe_W`, however old. What was told last is kept where it can be, so a higher rank takes
- * from nobody. While the sum is above (the limit fell, or after a start) nobody is told more than last. Cost: O(connectors).
+ * from nobody. While the sum is above (the limit fell, or after a start) nobody is told more than last, and while that of those
+ * whose setpoints ran out is, nobody any: which of them can be reached is not known. Cost: O(connectors).
  */
 void taper_ledger_grant_fallback(const taper_ledger_t *ledger, const taper_station_config_t *config,
                                  const taper_snapshot_t *snapshot, const taper_rows_t *rows,
