@@ -12,8 +12,8 @@
  * - The site's limit (gateway, failsafe, curve, less other load) falls. What was in force within the last
  *   `account_window_ms()` counts: 1 tick until it is seen, 0.5 s that a frame may wait, 3 s validity of the last
  *   setpoint that got through, and the longest reaction: 9.5 s (the protocol's worst case is 11 s).
- * - A connector that nobody reaches keeps its fallback current, even if the site's limit falls below it. Then the others
- *   draw nothing.
+ * - A connector that nobody reaches keeps its fallback current, even if the site's limit falls below it, and for a reaction
+ *   from when it is reached again. Then the others draw nothing.
  * - Fallback currents told sum to no more than the failsafe limit of the last 5 s. One that accepted nothing for 3.5 s
  *   keeps what it was told.
  * - What is really drawn, by vehicles that lie, is back within ACCOUNT_OVER_ms.

@@ -140,6 +140,43 @@ static void test_a_silent_gateway_leaves_the_failsafe_limit_less_the_greatest_ot
     bench_objects(RULE_SITE_W);
 }
 
+/** Connectors 1 and 2 draw 4.14 kW each, and the site has 5 kW. */
+static void fall_back_above_the_site_limit(void) {
+    bench_setpoint(0, 6000, 6000);
+    bench_setpoint(1, 6000, 6000);
+    bench_deaf(0);
+    bench_deaf(1);
+    bench_pass(20000);
+    bench_limit(5000, 11000);
+    bench_pass(20000);
+    bench_content();
+}
+
+static void test_who_fell_back_and_is_told_the_same_again_counts_as_what_his_vehicle_could_not_leave_yet(
+    void) {
+    fall_back_above_the_site_limit();
+    bench_setpoint(0, 0, 0);
+    bench_setpoint(1, 6000, 6000);
+    bench_pass(20000);
+    bench_content();
+}
+
+static void test_who_fell_back_has_to_make_room_within_his_vehicles_reaction_once_he_is_reached(void) {
+    fall_back_above_the_site_limit();
+    bench_setpoint(0, 6000, 6000);
+    bench_setpoint(1, 6000, 6000);
+    bench_pass(4750);
+    bench_content();
+    bench_pass(250);
+    bench_objects(RULE_SITE_W);
+}
+
+static void test_beside_who_fell_back_above_the_site_limit_nobody_gets_more(void) {
+    fall_back_above_the_site_limit();
+    bench_setpoint(1, 6100, 6000);
+    bench_objects(RULE_SITE_W);
+}
+
 static void test_fallback_currents_within_the_failsafe_limit_are_no_violation(void) {
     bench_setpoint(0, 6000, 6000);
     bench_setpoint(1, 6000, 6000);
@@ -266,6 +303,9 @@ int main(void) {
     RUN_TEST(test_a_site_limit_that_fell_has_to_be_kept_after_9_5_seconds);
     RUN_TEST(test_other_load_that_rose_has_to_be_made_room_for);
     RUN_TEST(test_a_silent_gateway_leaves_the_failsafe_limit_less_the_greatest_other_load);
+    RUN_TEST(test_who_fell_back_and_is_told_the_same_again_counts_as_what_his_vehicle_could_not_leave_yet);
+    RUN_TEST(test_who_fell_back_has_to_make_room_within_his_vehicles_reaction_once_he_is_reached);
+    RUN_TEST(test_beside_who_fell_back_above_the_site_limit_nobody_gets_more);
     RUN_TEST(test_fallback_currents_within_the_failsafe_limit_are_no_violation);
     RUN_TEST(test_fallback_currents_beyond_the_failsafe_limit_are_one);
     RUN_TEST(test_a_failsafe_limit_that_fell_leaves_five_seconds_to_who_can_be_reached);
