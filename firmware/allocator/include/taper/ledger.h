@@ -7,7 +7,8 @@
  * draws the fallback current of the setpoint that it accepted last, for as long as nobody reaches it. Without a vehicle
  * (pilot A, or so it says) its contactor is open and all of this is over at once; the next vehicle draws nothing before
  * its first setpoint. What one connector holds like this, no other is given: break before make (docs/protocol.md, the four
- * rules).
+ * rules). An echo proves nothing of a setpoint whose counter it named before that was sent: a frame whose counter was
+ * corrupted may have a good CRC (docs/protocol.md). The next setpoint is proven again.
  *
  * What a connector measures above all that, and above the tolerance of draw.h, counts as drawn for as long as it says so
  * (fault 41).
@@ -56,6 +57,8 @@ typedef struct {
     int32_t unknown_mA;   /**< what a controller before this one may have told it; 0: nothing any more */
     uint32_t unknown_until_ms; /**< end of that, with the vehicle's reaction */
     uint8_t first_echo;      /**< + 1; may still be of that time. 0: none heard; UINT8_MAX: echoes are ours */
+    uint8_t reported;        /**< + 1: the counter that it echoed last; 0: none, or it fell back since */
+    uint8_t unproven;        /**< + 1: the setpoint whose counter it echoed before that was sent; 0: none */
     bool accepts;            /**< it has accepted a setpoint of ours since its vehicle came */
     int32_t drawn_mA;        /**< measured above what it may; 0: not so */
     uint32_t drawn_until_ms; /**< for how long that holds without another report */
