@@ -177,6 +177,42 @@ static void test_beside_who_fell_back_above_the_site_limit_nobody_gets_more(void
     bench_objects(RULE_SITE_W);
 }
 
+static void test_who_falls_back_after_the_site_limit_fell_has_to_be_made_room_for_within_9_5_seconds(void) {
+    bench_setpoint(0, 6000, 6000); /* 4.14 kW */
+    bench_setpoint(1, 6000, 6000);
+    bench_pass(20000);
+    bench_deaf(0);
+    bench_limit(5000, 11000);
+    bench_pass(12500); /* it fell back after 3 s */
+    bench_content();
+    bench_pass(250);
+    bench_objects(RULE_SITE_W);
+}
+
+static void test_who_falls_back_excuses_nobody_from_a_site_limit_that_did_not_fall(void) {
+    bench_limit(8000, 11000);
+    bench_pass(20000);
+    bench_setpoint(0, 6000, 6000);
+    bench_deaf(0);
+    bench_pass(3250);
+    bench_content();
+    bench_setpoint(1, 6000, 0);
+    bench_objects(RULE_SITE_W);
+}
+
+static void test_who_falls_back_excuses_no_more_than_his_fallback_current(void) {
+    bench_setpoint(0, 6000, 6000);
+    bench_setpoint(1, 14000, 0); /* 9.66 kW */
+    bench_pass(20000);
+    bench_deaf(0);
+    bench_limit(10000, 11000);
+    bench_pass(9500);
+    bench_content();
+    bench_setpoint(1, 14500, 0); /* with the fallback current 14.145 kW */
+    bench_pass(250);
+    bench_objects(RULE_SITE_W);
+}
+
 static void test_fallback_currents_within_the_failsafe_limit_are_no_violation(void) {
     bench_setpoint(0, 6000, 6000);
     bench_setpoint(1, 6000, 6000);
@@ -306,6 +342,9 @@ int main(void) {
     RUN_TEST(test_who_fell_back_and_is_told_the_same_again_counts_as_what_his_vehicle_could_not_leave_yet);
     RUN_TEST(test_who_fell_back_has_to_make_room_within_his_vehicles_reaction_once_he_is_reached);
     RUN_TEST(test_beside_who_fell_back_above_the_site_limit_nobody_gets_more);
+    RUN_TEST(test_who_falls_back_after_the_site_limit_fell_has_to_be_made_room_for_within_9_5_seconds);
+    RUN_TEST(test_who_falls_back_excuses_nobody_from_a_site_limit_that_did_not_fall);
+    RUN_TEST(test_who_falls_back_excuses_no_more_than_his_fallback_current);
     RUN_TEST(test_fallback_currents_within_the_failsafe_limit_are_no_violation);
     RUN_TEST(test_fallback_currents_beyond_the_failsafe_limit_are_one);
     RUN_TEST(test_a_failsafe_limit_that_fell_leaves_five_seconds_to_who_can_be_reached);
