@@ -127,7 +127,8 @@ int32_t taper_ledger_unreached_mA(const taper_ledger_t *ledger, uint8_t connecto
 /**
  * Bound `target`, which holds every limit by itself, by what others may still draw: decreases go through, increases in the
  * order of `rank` as far as room is left in every row of `rows`, those of now. Below a row that is overdrawn (its limit fell,
- * or a vehicle over-draws) nobody is told more than last, so the excess ends when the slowest vehicle has followed.
+ * or a vehicle over-draws) nobody is told more than last, so the excess ends when the slowest vehicle has followed; and whose
+ * setpoints ran out nothing, since he may draw nothing by now.
  * `granted <= target` for every connector, and at least the minimum current or nothing. Where a group limits its imbalance,
  * that holds for what is granted too. Cost: O(connectors x depth of the tree), and that of taper_balance().
  */
