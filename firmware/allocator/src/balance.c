@@ -64,50 +64,44 @@ static void add_connector(const balance_t *balance, uint8_t i, sums_t *sums) {
     }
 }
 
-/** Add all currents to `sums`, which are 0, by group and phase. */
-static void sum_phases(const balance_t *balance, sums_t *sums) {
-    const taper_station_config_t *config = balance->config;
-    for (uint8_t i = 0; i < config->connector_count; i++) {
-        add_connector(balance, i, &sums[config->connectors[i].group]);
-    }
-    for (uint8_t k = config->group_count; k-- > 0;) { /* children stand behind their parents */
-        const uint8_t parent = config->groups[k].parent;
-        for (unsigned phase = 0; phase < PHASES && parent != TAPER_NO_GROUP; phase++) {
-            sums[parent].most_uA[phase] += sums[k].most_uA[phase];
-            sums[parent].least_uA[phase] += sums[k].least_uA[phase];
+static sums_t sums_of(const balance_t *balance, uint8_t group) {
+    sums_t sums = {{0}, {0}};
+    for (uint8_t i = 0; i < balance->config->connector_count; i++) {
+        if (taper_group_contains(balance->config, group, i)) {
+            add_connector(balance, i, &sums);
         }
     }
+    return sums;
 }
 
 /** The two phases that may differ most; of those alike the first. */
-static tilt_t tilt_of(const balance_t *balance, uint8_t k, const sums_t *sums) {
+static tilt_t tilt_of(const balance_t *balance, uint8_t k) {
+    const sums_t sums = sums_of(balance, k);
     tilt_t tilt = {.group = k, .excess_uA = INT64_MIN};
     for (unsigned pair = 0; pair < PHASES * (PHASES - 1u); pair++) {
         const unsigned strong = pair / (PHASES - 1u);
         const unsigned other = pair % (PHASES - 1u);
         const unsigned weak = other < strong ? other : other + 1u;
-        const int64_t apart_uA = sums->most_uA[strong] - sums->least_uA[weak];
+        const int64_t apart_uA = sums.most_uA[strong] - sums.least_uA[weak];
         if (apart_uA > tilt.excess_uA) {
             tilt.strong = (uint8_t)(1u << strong);
             tilt.weak = (uint8_t)(1u << weak);
             tilt.excess_uA = apart_uA;
         }
     }
-    tilt.excess_uA -= (int64_t)taper_row_limit(balance->config, k, TAPER_ROW_L1_L2) * 1000;
+    tilt.excess_uA -= (int64_t)balance->config->groups[k].imbalance_mA * 1000;
     return tilt;
 }
 
 /** The first group from the leaves up that tilts: what helps it may help those above. */
 static tilt_t find_tilt(const balance_t *balance) {
-    sums_t sums[TAPER_MAX_GROUPS] = {0};
-    sum_phases(balance, sums);
-    for (uint8_t k = balance->config->group_count; k-- > 0;) {
-        const tilt_t tilt = tilt_of(balance, k, &sums[k]);
-        if (tilt.excess_uA > 0) {
-            return tilt;
+    tilt_t tilt = {.excess_uA = 0};
+    for (uint8_t k = balance->config->group_count; k-- > 0 && tilt.excess_uA <= 0;) {
+        if (balance->config->groups[k].imbalance_mA != 0) {
+            tilt = tilt_of(balance, k);
         }
     }
-    return (tilt_t){.excess_uA = 0};
+    return tilt;
 }
 
 /** Whether less current of this connector makes the tilt less: it may be on the strong phase, and not on the weak one. */
