@@ -140,8 +140,8 @@ void taper_ledger_grant(const taper_ledger_t *ledger, const taper_station_config
  * Choose the fallback current that goes with each setpoint: in the order of `rank` the configured one, never above what is
  * granted, at least the minimum current or nothing, in steps of TAPER_FALLBACK_STEP_mA. The sum of the power of all that connectors may
  * have been told stays within `failsafe_W`, however old. What was told last is kept where it can be, so a higher rank takes
- * from nobody. While the sum is above (the limit fell, or after a start) nobody is told more than last, and while that of those
- * whose setpoints ran out is, nobody any: which of them can be reached is not known. Cost: O(connectors).
+ * from nobody. While the sum is above (the limit fell, or after a start) nobody is told any: who can be reached gives up for who
+ * cannot. Cost: O(connectors).
  */
 void taper_ledger_grant_fallback(const taper_ledger_t *ledger, const taper_station_config_t *config,
                                  const taper_snapshot_t *snapshot, const taper_rows_t *rows,
@@ -156,7 +156,7 @@ bool taper_guard_hand_over_passes(const taper_ledger_t *ledger, const taper_stat
                                   const taper_snapshot_t *snapshot, const taper_supply_t *supply,
                                   const taper_setpoints_t *granted);
 
-/** The same for fallback currents: none above its setpoint, and their sum within `failsafe_W`, or no more than before. */
+/** The same for fallback currents: none above its setpoint, and the sum of all that may have been told within `failsafe_W`, or none. */
 bool taper_guard_fallback_passes(const taper_ledger_t *ledger, const taper_station_config_t *config,
                                  const taper_snapshot_t *snapshot, int32_t failsafe_W,
                                  const taper_setpoints_t *granted, const taper_setpoints_t *fallback);
