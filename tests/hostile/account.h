@@ -12,8 +12,8 @@
  * - The site's limit (gateway, failsafe, curve, less other load) falls. What was in force within the last
  *   `account_window_ms()` counts: 1 tick until it is seen, 0.5 s that a frame may wait, 3 s validity of the last
  *   setpoint that got through, and the longest reaction: 9.5 s (the protocol's worst case is 11 s).
- * - A connector that nobody reaches keeps its fallback current, even if the site's limit falls below it, and for a reaction
- *   from when it is reached again. Then the others draw nothing.
+ * - A connector that nobody reaches keeps its fallback current, even if the site's limit falls below it. Then the others
+ *   draw nothing.
  * - That it will fall back is not known before: the protocol reserves the setpoint of a connector that is lost until it
  *   expires, and then its fallback current, and only then plans the others anew. So from when it fell back they have that
  *   window once more to make room for its fallback current, below what was in force before: 14 s from a limit that fell.
@@ -77,10 +77,19 @@ typedef struct {
     taper_frame_t frame;
 } seen_t;
 
+/** EV_PARAM_A, B and C: a session counts when all three agree. */
+enum { ACCOUNT_PARAMS = 3 };
+
+typedef struct {
+    wire_receiver_t receiver;
+    bool heard;
+    uint8_t revision, session; /**< C has no session */
+} param_t;
+
 /** One connector. */
 typedef struct {
-    wire_receiver_t to_connector, status,
-        params; /**< of SETPOINT at the connector; of reports at the station */
+    wire_receiver_t to_connector, status; /**< of SETPOINT at the connector; of EVSE_STATUS at the station */
+    param_t param[ACCOUNT_PARAMS];        /**< since the station began */
     bool plugged;
     uint8_t session;
     uint8_t conductors; /**< that the vehicle uses, if it may */
@@ -106,7 +115,7 @@ typedef struct {
     uint8_t told_conductors; /**< or seen to carry current */
     uint8_t tick_conductors; /**< the same at the last control tick */
     uint8_t told_session
-        [2]; /**< by EV_PARAM_A: the last, and the one before; the store keeps sessions over a restart */
+        [2]; /**< by a whole set: the last, and the one before; the store keeps sessions over a restart */
 
     bool wants;
     int64_t waits_since_ms;

@@ -38,14 +38,10 @@ static int64_t reaction_ms(const account_t *account, unsigned connector) {
     return account->config->connectors[connector].reaction_ms;
 }
 
-/**
- * Let the level be `mA` from `at_ms` on; the vehicle leaves a higher one in its own time. A fallback current is one that it
- * leaves whatever the level becomes: had the connector been told 0 A now, its vehicle would draw that for as long, so nobody can
- * be blamed for it sooner, nor for telling the same again while others make room.
- */
+/** Let the level be `mA` from `at_ms` on; the vehicle leaves a higher one in its own time. */
 static void move_level(account_t *account, unsigned connector, int32_t mA, int64_t at_ms) {
     book_t *book = &account->book[connector];
-    if (mA < book->level_mA || (book->fell_back && book->level_mA > 0)) {
+    if (mA < book->level_mA) {
         fade(book, book->level_mA, at_ms + reaction_ms(account, connector), book->fell_back);
     }
     book->level_mA = mA;
