@@ -285,6 +285,57 @@ static void test_a_rank_that_names_nobody_or_one_twice_still_cuts(void) {
     assert_currents(6000, 8000, 6000);
 }
 
+static void test_a_setpoint_does_not_balance_phases_that_only_older_ones_are_on(void) {
+    add(0, L1, 15000);
+    add(0, L2, 16000);
+    add(0, L1 | L2 | L3, 18000); /* on L2 by now: 15, 34, 0 */
+    tree.snapshot.demand[2].booking.idle = L1 | L3;
+    tree.snapshot.demand[2].booking.unsure = L1 | L3;
+    tree.group[0].imbalance_mA = 20000;
+    TEST_ASSERT_FALSE(tree_guard(&tree));
+    balance();
+    assert_currents(15000, 14000, 6000);
+}
+
+static void test_phases_that_only_older_setpoints_are_on_are_not_the_strong_ones(void) {
+    add(0, L1, 15000);
+    add(0, L2, 2000);
+    add(0, L1 | L2 | L3, 18000); /* on L2 by now: 15, 20, 0 */
+    tree.snapshot.demand[2].booking.idle = L1 | L3;
+    tree.snapshot.demand[2].booking.unsure = L1 | L3;
+    tree.snapshot.demand[1].min_mA = 0;
+    tree_assert_just_enough(&tree, &tree.group[0].imbalance_mA, 20000);
+    balance();
+    assert_currents(15000, 2000, 18000);
+}
+
+static void test_a_current_on_a_phase_that_nobody_knows_counts_on_each_and_balances_none(void) {
+    static const uint8_t lines[] = {L1, L2, L3};
+    for (unsigned known = 0; known < 3; known++) {
+        setUp();
+        add(0, lines[known], 8000);
+        add(0, L1 | L2 | L3, 16000);
+        tree.snapshot.demand[1].booking.unsure = L1 | L2 | L3;
+        tree_assert_just_enough(&tree, &tree.group[0].imbalance_mA, 24000);
+        tree.group[0].imbalance_mA = 15000;
+        balance();
+        assert_currents(8000, 7000, 0);
+    }
+}
+
+static void test_a_current_on_one_of_two_phases_is_held_against_the_other(void) {
+    add(0, L1, 20000);
+    add(0, L2, 20000);
+    add(0, L1 | L2, 16000);
+    tree.snapshot.demand[2].booking.line_to_line = false;
+    tree.snapshot.demand[2].booking.unsure = L1 | L2;
+    add(0, L3, 20000); /* 36 or 20, 20 or 36, 20 */
+    tree_assert_just_enough(&tree, &tree.group[0].imbalance_mA, 16000);
+    tree.group[0].imbalance_mA = 10000;
+    balance();
+    TEST_ASSERT_EQUAL_INT32(10000, tree.setpoints.current_mA[2]);
+}
+
 static void test_what_carries_nothing_is_no_help(void) {
     add(0, L1, 16000);
     add(0, L1, 16000);
@@ -388,6 +439,10 @@ int main(void) {
     RUN_TEST(test_each_group_is_balanced_by_its_own_connectors);
     RUN_TEST(test_what_balances_the_site_may_tilt_a_feeder_and_both_hold_in_the_end);
     RUN_TEST(test_a_rank_that_names_nobody_or_one_twice_still_cuts);
+    RUN_TEST(test_a_setpoint_does_not_balance_phases_that_only_older_ones_are_on);
+    RUN_TEST(test_phases_that_only_older_setpoints_are_on_are_not_the_strong_ones);
+    RUN_TEST(test_a_current_on_a_phase_that_nobody_knows_counts_on_each_and_balances_none);
+    RUN_TEST(test_a_current_on_one_of_two_phases_is_held_against_the_other);
     RUN_TEST(test_what_carries_nothing_is_no_help);
     RUN_TEST(test_a_cut_counts_by_what_flows_for_an_ampere);
     RUN_TEST(test_of_a_rank_no_more_is_read_than_there_are_connectors);

@@ -130,7 +130,7 @@ void account_station_started(account_t *account) {
         book->told_conductors = 3;
         book->tick_conductors = 3;
         memset(&book->status, 0, sizeof book->status);
-        memset(&book->params, 0, sizeof book->params);
+        memset(book->param, 0, sizeof book->param);
     }
     memset(account->is_over, 0, sizeof account->is_over);
 }
@@ -187,6 +187,27 @@ static void hear_status(account_t *account, book_t *book, const taper_frame_t *f
     book->told_conductors = told == 0 ? 3 : told > measured ? told : measured;
 }
 
+/** A set is whole when all parts agree on the revision, and those that have a session on that. */
+static bool is_whole(const param_t *a, const param_t *b, const param_t *c) {
+    return a->heard && b->heard && c->heard && a->revision == b->revision && a->revision == c->revision &&
+           a->session == b->session;
+}
+
+static void hear_param(book_t *book, unsigned part, const taper_frame_t *frame) {
+    param_t *param = &book->param[part];
+    if (!wire_accepts(&param->receiver, frame)) {
+        return;
+    }
+    param->heard = true;
+    param->revision = (uint8_t)wire_get(frame, 12, 4);
+    param->session = (uint8_t)wire_get(frame, part == 0 ? 16 : 56, 8);
+    const uint8_t session = book->param[0].session;
+    if (is_whole(&book->param[0], &book->param[1], &book->param[2]) && session != book->told_session[0]) {
+        book->told_session[1] = book->told_session[0];
+        book->told_session[0] = session;
+    }
+}
+
 void account_heard(account_t *account, const taper_frame_t *frame, int64_t at_ms) {
     const int connector = account_connector_of(account, wire_node(frame));
     account->verdict.frames++;
@@ -200,12 +221,8 @@ void account_heard(account_t *account, const taper_frame_t *frame, int64_t at_ms
     if (wire_function(frame) == WIRE_EVSE_STATUS) {
         see(account, (unsigned)connector, "heard", frame);
         hear_status(account, book, frame);
-    } else if (wire_function(frame) == WIRE_EV_PARAM_A && wire_accepts(&book->params, frame)) {
-        const uint8_t session = (uint8_t)wire_get(frame, 16, 8);
-        if (session != book->told_session[0]) {
-            book->told_session[1] = book->told_session[0];
-            book->told_session[0] = session;
-        }
+    } else if (wire_function(frame) >= WIRE_EV_PARAM_A && wire_function(frame) <= WIRE_EV_PARAM_C) {
+        hear_param(book, wire_function(frame) - WIRE_EV_PARAM_A, frame);
     }
 }
 

@@ -14,6 +14,9 @@
  *   setpoint that got through, and the longest reaction: 9.5 s (the protocol's worst case is 11 s).
  * - A connector that nobody reaches keeps its fallback current, even if the site's limit falls below it. Then the others
  *   draw nothing.
+ * - That it will fall back is not known before: the protocol reserves the setpoint of a connector that is lost until it
+ *   expires, and then its fallback current, and only then plans the others anew. So from when it fell back they have that
+ *   window once more to make room for its fallback current, below what was in force before: 14 s from a limit that fell.
  * - Fallback currents told sum to no more than the failsafe limit of the last 5 s. One that accepted nothing for 3.5 s
  *   keeps what it was told.
  * - What is really drawn, by vehicles that lie, is back within ACCOUNT_OVER_ms.
@@ -74,10 +77,19 @@ typedef struct {
     taper_frame_t frame;
 } seen_t;
 
+/** EV_PARAM_A, B and C: a session counts when all three agree. */
+enum { ACCOUNT_PARAMS = 3 };
+
+typedef struct {
+    wire_receiver_t receiver;
+    bool heard;
+    uint8_t revision, session; /**< C has no session */
+} param_t;
+
 /** One connector. */
 typedef struct {
-    wire_receiver_t to_connector, status,
-        params; /**< of SETPOINT at the connector; of reports at the station */
+    wire_receiver_t to_connector, status; /**< of SETPOINT at the connector; of EVSE_STATUS at the station */
+    param_t param[ACCOUNT_PARAMS];        /**< since the station began */
     bool plugged;
     uint8_t session;
     uint8_t conductors; /**< that the vehicle uses, if it may */
@@ -85,7 +97,8 @@ typedef struct {
     int64_t allowed_ms;
     int32_t level_mA, fallback_mA;
     int64_t expires_ms, accepted_ms;
-    bool fell_back; /**< nothing is in force any more but the fallback current */
+    bool fell_back;  /**< nothing is in force any more but the fallback current */
+    int64_t fell_ms; /**< since when, or when that was so last */
     fade_t fade[ACCOUNT_FADES];
     unsigned fades;
     double drawn_mA[3]; /**< really, on each conductor */
@@ -93,14 +106,16 @@ typedef struct {
 
     bool sent_counter_known;
     uint8_t sent_counter;
-    int32_t sent_mA; /**< in the last setpoint that the bus took */
+    int32_t sent_mA;         /**< in the last setpoint that the bus took */
+    uint8_t sent_conductors; /**< that its phase mask allows: where it counts, whatever the vehicle does */
     int64_t sent_ms;
 
     bool told_vehicle; /**< by the last EVSE_STATUS that reached the station */
     int64_t told_vehicle_ms;
     uint8_t told_conductors; /**< or seen to carry current */
     uint8_t tick_conductors; /**< the same at the last control tick */
-    uint8_t told_session[2]; /**< by EV_PARAM_A: the last, and the one before; the store keeps sessions over a restart */
+    uint8_t told_session
+        [2]; /**< by a whole set: the last, and the one before; the store keeps sessions over a restart */
 
     bool wants;
     int64_t waits_since_ms;

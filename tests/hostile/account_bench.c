@@ -10,7 +10,7 @@ account_t account;
 
 static struct {
     uint8_t setpoint_counter[TAPER_MAX_CONNECTORS], status_counter[TAPER_MAX_CONNECTORS];
-    uint8_t param_counter[TAPER_MAX_CONNECTORS], limit_counter, meter_counter;
+    uint8_t param_counter[TAPER_MAX_CONNECTORS][ACCOUNT_PARAMS], limit_counter, meter_counter;
     int32_t current_mA[TAPER_MAX_CONNECTORS], fallback_mA[TAPER_MAX_CONNECTORS];
     bool deaf[TAPER_MAX_CONNECTORS], there[TAPER_MAX_CONNECTORS];
     int32_t limit_W, failsafe_W, other_mA;
@@ -36,15 +36,21 @@ static void report_gateway(void) {
     hear(meter, &bench.meter_counter);
 }
 
+void bench_param(unsigned connector, unsigned part, uint8_t revision, uint8_t session) {
+    taper_frame_t frame = wire_frame(WIRE_EV_PARAM_A + part, account.config->connectors[connector].node);
+    wire_put(&frame, 12, 4, revision);
+    wire_put(&frame, part == 0 ? 16 : 56, 8, session);
+    hear(frame, &bench.param_counter[connector][part]);
+}
+
 static void report_connector(unsigned i) {
-    const unsigned node = account.config->connectors[i].node;
-    taper_frame_t status = wire_frame(WIRE_EVSE_STATUS, node);
-    taper_frame_t params = wire_frame(WIRE_EV_PARAM_A, node);
+    taper_frame_t status = wire_frame(WIRE_EVSE_STATUS, account.config->connectors[i].node);
     wire_put(&status, 12, 4, bench.there[i] ? 2 : 0);
     wire_put(&status, 63, 1, bench.there[i]);
-    wire_put(&params, 16, 8, SESSION);
     hear(status, &bench.status_counter[i]);
-    hear(params, &bench.param_counter[i]);
+    for (unsigned part = 0; part < ACCOUNT_PARAMS; part++) {
+        bench_param(i, part, 0, SESSION);
+    }
 }
 
 taper_frame_t bench_frame(unsigned connector, int32_t current_mA, int32_t fallback_mA) {

@@ -20,6 +20,9 @@ void bench_other_load(int32_t each_phase_mA);
 /** The connector reports a vehicle, or none, from now on. */
 void bench_vehicle(unsigned connector, bool there);
 
+/** The connector reports EV_PARAM_A (part 0), B or C once. */
+void bench_param(unsigned connector, unsigned part, uint8_t revision, uint8_t session);
+
 /** The station sends this, and it is delivered, each time that time passes by another second. */
 void bench_setpoint(unsigned connector, int32_t current_mA, int32_t fallback_mA);
 /** No more setpoints. */

@@ -52,18 +52,31 @@ static void check_described(account_t *account, const loads_t *legal) {
     }
 }
 
-static double site_limit_W(const account_t *account, const loads_t *stuck) {
-    const double most_W = account_most(account, &account->supply.site_W, account_window_ms(account));
-    return fmax(most_W, stuck->group[0].power_W);
+/** What nobody can take back, and what of it fell back so lately that others may not have made room for it. */
+typedef struct {
+    loads_t all, lately;
+} stuck_t;
+
+/** What was in force a window ago, and for who makes room for others that fell back meanwhile, before that. */
+static double allowed(const account_t *account, const history_t *history, double stuck, double lately) {
+    const int64_t window_ms = account_window_ms(account);
+    const int64_t unknown_ms = account->config->tick_ms + ACCOUNT_LATE_ms + ACCOUNT_VALIDITY_ms;
+    const double most = account_most(account, history, window_ms);
+    const double before = account_most(account, history, window_ms + unknown_ms);
+    return fmax(stuck, fmin(before, most + lately));
 }
 
-static double site_limit_mA(const account_t *account, const loads_t *stuck, unsigned line) {
-    const history_t *history = &account->supply.phase_mA[line];
-    const double most_mA = account_most(account, history, account_window_ms(account));
-    return fmax(most_mA, load_line_mA(&stuck->group[0], line));
+static double site_limit_W(const account_t *account, const stuck_t *stuck) {
+    return allowed(account, &account->supply.site_W, stuck->all.group[0].power_W,
+                   stuck->lately.group[0].power_W);
 }
 
-static void check_site(account_t *account, const loads_t *legal, const loads_t *stuck) {
+static double site_limit_mA(const account_t *account, const stuck_t *stuck, unsigned line) {
+    return allowed(account, &account->supply.phase_mA[line], load_line_mA(&stuck->all.group[0], line),
+                   load_line_mA(&stuck->lately.group[0], line));
+}
+
+static void check_site(account_t *account, const loads_t *legal, const stuck_t *stuck) {
     account_hold(account, RULE_SITE_W, 0, site_limit_W(account, stuck), legal->group[0].power_W, 1.0);
     for (unsigned line = 0; line < 3 && account->config->groups[0].limit_mA != 0; line++) {
         account_hold(account, RULE_SITE_A, 0, site_limit_mA(account, stuck, line),
@@ -118,7 +131,7 @@ static void time_excess(account_t *account, unsigned group, unsigned kind, doubl
     }
 }
 
-static void check_drawn(account_t *account, const loads_t *stuck) {
+static void check_drawn(account_t *account, const stuck_t *stuck) {
     loads_t drawn;
     memset(&drawn, 0, sizeof drawn);
     for (unsigned i = 0; i < account->config->connector_count; i++) {
@@ -155,8 +168,17 @@ static void check_waiting(account_t *account) {
     }
 }
 
+static void add_stuck(stuck_t *stuck, const account_t *account, unsigned connector, unsigned conductors) {
+    const int32_t stuck_mA = account_stuck_mA(account, connector);
+    add_equally(&stuck->all, account, connector, conductors, stuck_mA);
+    if (account->now_ms - account->book[connector].fell_ms <= account_window_ms(account)) {
+        add_equally(&stuck->lately, account, connector, conductors, stuck_mA);
+    }
+}
+
 void account_check(account_t *account) {
-    loads_t legal, stuck;
+    loads_t legal;
+    stuck_t stuck;
     memset(&legal, 0, sizeof legal);
     memset(&stuck, 0, sizeof stuck);
     account_supply_note(account);
@@ -165,7 +187,7 @@ void account_check(account_t *account) {
         account->verdict.vehicles += account->book[i].plugged ? 1u : 0u;
         account->verdict.charging += account->book[i].level_mA > 0 ? 1u : 0u;
         add_equally(&legal, account, i, conductors, account_legal_mA(account, i));
-        add_equally(&stuck, account, i, conductors, account_stuck_mA(account, i));
+        add_stuck(&stuck, account, i, conductors);
     }
     account->verdict.checks++;
     check_described(account, &legal);
@@ -181,13 +203,6 @@ void account_check(account_t *account) {
     }
 }
 
-/** By the conductors that the station has to believe in: fewer than the connector has only where it said so. */
-static unsigned conductors_told(const account_t *account, unsigned connector) {
-    const unsigned wired = account->config->connectors[connector].phases;
-    const unsigned told = account->book[connector].told_conductors;
-    return told < wired ? told : wired;
-}
-
 void account_tick(account_t *account, bool all_taken) {
     loads_t sent;
     account->ticked_ms = account->now_ms;
@@ -195,7 +210,7 @@ void account_tick(account_t *account, bool all_taken) {
     for (unsigned i = 0; i < account->config->connector_count; i++) {
         account->book[i].tick_conductors = account->book[i].told_conductors;
         all_taken = all_taken && account->now_ms - account->book[i].sent_ms <= SENT_LATELY_ms;
-        add_equally(&sent, account, i, conductors_told(account, i), account->book[i].sent_mA);
+        add_equally(&sent, account, i, account->book[i].sent_conductors, account->book[i].sent_mA);
     }
     for (unsigned group = 0; all_taken && group < account->config->group_count; group++) {
         const double limit_mA = account->config->groups[group].imbalance_mA;

@@ -53,6 +53,7 @@ void account_expire(account_t *account) {
         if (!book->fell_back && account->now_ms >= book->expires_ms) {
             move_level(account, i, book->fallback_mA, book->expires_ms);
             book->fell_back = true;
+            book->fell_ms = book->expires_ms;
         }
         drop_old_fades(book, account->now_ms);
     }

@@ -27,11 +27,15 @@ static unsigned least(unsigned a, unsigned b) {
     return a < b ? a : b;
 }
 
+static unsigned conductors_of(const wire_setpoint_t *setpoint) {
+    return setpoint->phase_mask == 7 ? 3 : setpoint->phase_mask == 3 ? 2 : 1;
+}
+
 /** With a current: no more conductors than the connector uses, by what the station has heard now or in its last tick. */
 static void judge_phases(account_t *account, unsigned connector, const wire_setpoint_t *setpoint) {
     const book_t *book = &account->book[connector];
     const unsigned wired = account->config->connectors[connector].phases;
-    const unsigned conductors = setpoint->phase_mask == 7 ? 3 : setpoint->phase_mask == 3 ? 2 : 1;
+    const unsigned conductors = conductors_of(setpoint);
     const bool whole = setpoint->phase_mask == (1u << conductors) - 1u && conductors <= wired;
     const bool used = conductors <= least(wired, book->told_conductors) ||
                       conductors <= least(wired, book->tick_conductors);
@@ -76,4 +80,5 @@ void account_judge_setpoint(account_t *account, unsigned connector, const taper_
     judge_session(account, connector, &setpoint);
     account->book[connector].sent_ms = account->now_ms;
     account->book[connector].sent_mA = setpoint.current_mA;
+    account->book[connector].sent_conductors = (uint8_t)conductors_of(&setpoint);
 }

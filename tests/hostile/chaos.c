@@ -263,10 +263,9 @@ static void change_policy(world_t *world) {
     }
 }
 
-/** Connectors that say something odd about themselves: where imbalance counts, their wiring has to be known. */
+/** Connectors that say something odd about themselves. */
 static void be_odd(world_t *world, node_t *node) {
-    const bool may = world->config->groups[0].imbalance_mA == 0 && world->era != ERA_FAIR;
-    if (may && random_once_in(&world->random, 3000)) {
+    if (world->era != ERA_FAIR && random_once_in(&world->random, 3000)) {
         node->info_odd = !node->info_odd;
     }
 }

@@ -140,6 +140,75 @@ static void test_a_silent_gateway_leaves_the_failsafe_limit_less_the_greatest_ot
     bench_objects(RULE_SITE_W);
 }
 
+/** Connectors 1 and 2 draw 4.14 kW each, and the site has 5 kW. */
+static void fall_back_above_the_site_limit(void) {
+    bench_setpoint(0, 6000, 6000);
+    bench_setpoint(1, 6000, 6000);
+    bench_deaf(0);
+    bench_deaf(1);
+    bench_pass(20000);
+    bench_limit(5000, 11000);
+    bench_pass(20000);
+    bench_content();
+}
+
+static void test_who_fell_back_above_the_site_limit_may_be_told_nothing_in_whatever_order(void) {
+    fall_back_above_the_site_limit();
+    bench_setpoint(1, 0, 0);
+    bench_pass(2000);
+    bench_setpoint(0, 0, 0);
+    bench_pass(20000);
+    bench_content();
+}
+
+static void test_who_fell_back_above_the_site_limit_may_not_be_told_the_same_again(void) {
+    fall_back_above_the_site_limit();
+    bench_setpoint(1, 6000, 6000);
+    bench_objects(RULE_SITE_W);
+}
+
+static void test_beside_who_fell_back_above_the_site_limit_nobody_gets_more(void) {
+    fall_back_above_the_site_limit();
+    bench_setpoint(1, 6100, 6000);
+    bench_objects(RULE_SITE_W);
+}
+
+static void test_who_falls_back_after_the_site_limit_fell_has_to_be_made_room_for_within_9_5_seconds(void) {
+    bench_setpoint(0, 6000, 6000); /* 4.14 kW */
+    bench_setpoint(1, 6000, 6000);
+    bench_pass(20000);
+    bench_deaf(0);
+    bench_limit(5000, 11000);
+    bench_pass(12500); /* it fell back after 3 s */
+    bench_content();
+    bench_pass(250);
+    bench_objects(RULE_SITE_W);
+}
+
+static void test_who_falls_back_excuses_nobody_from_a_site_limit_that_did_not_fall(void) {
+    bench_limit(8000, 11000);
+    bench_pass(20000);
+    bench_setpoint(0, 6000, 6000);
+    bench_deaf(0);
+    bench_pass(3250);
+    bench_content();
+    bench_setpoint(1, 6000, 0);
+    bench_objects(RULE_SITE_W);
+}
+
+static void test_who_falls_back_excuses_no_more_than_his_fallback_current(void) {
+    bench_setpoint(0, 6000, 6000);
+    bench_setpoint(1, 14000, 0); /* 9.66 kW */
+    bench_pass(20000);
+    bench_deaf(0);
+    bench_limit(10000, 11000);
+    bench_pass(9500);
+    bench_content();
+    bench_setpoint(1, 14500, 0); /* with the fallback current 14.145 kW */
+    bench_pass(250);
+    bench_objects(RULE_SITE_W);
+}
+
 static void test_fallback_currents_within_the_failsafe_limit_are_no_violation(void) {
     bench_setpoint(0, 6000, 6000);
     bench_setpoint(1, 6000, 6000);
@@ -174,6 +243,22 @@ static void test_setpoints_of_phases_that_differ_too_much_are_a_violation(void) 
     bench_setpoint(0, 16100, 0); /* on L1, none on L2 */
     account_tick(&account, false);
     bench_content();
+    account_tick(&account, true);
+    bench_objects(RULE_IMBALANCE_A);
+}
+
+static void test_a_setpoint_for_one_of_three_phases_is_held_against_the_other_two(void) {
+    bench_start(SOCKETS);
+    taper_frame_t frame = bench_frame_with(6, 20000, 48, 3, 1); /* on L2: its wiring is 213 */
+    account_sent(&account, &frame);
+    account_tick(&account, true);
+    bench_content();
+    frame = bench_frame_with(6, 20100, 48, 3, 7); /* on all three */
+    account_sent(&account, &frame);
+    account_tick(&account, true);
+    bench_content();
+    frame = bench_frame_with(6, 20100, 48, 3, 1);
+    account_sent(&account, &frame);
     account_tick(&account, true);
     bench_objects(RULE_IMBALANCE_A);
 }
@@ -250,10 +335,17 @@ int main(void) {
     RUN_TEST(test_a_site_limit_that_fell_has_to_be_kept_after_9_5_seconds);
     RUN_TEST(test_other_load_that_rose_has_to_be_made_room_for);
     RUN_TEST(test_a_silent_gateway_leaves_the_failsafe_limit_less_the_greatest_other_load);
+    RUN_TEST(test_who_fell_back_above_the_site_limit_may_be_told_nothing_in_whatever_order);
+    RUN_TEST(test_who_fell_back_above_the_site_limit_may_not_be_told_the_same_again);
+    RUN_TEST(test_beside_who_fell_back_above_the_site_limit_nobody_gets_more);
+    RUN_TEST(test_who_falls_back_after_the_site_limit_fell_has_to_be_made_room_for_within_9_5_seconds);
+    RUN_TEST(test_who_falls_back_excuses_nobody_from_a_site_limit_that_did_not_fall);
+    RUN_TEST(test_who_falls_back_excuses_no_more_than_his_fallback_current);
     RUN_TEST(test_fallback_currents_within_the_failsafe_limit_are_no_violation);
     RUN_TEST(test_fallback_currents_beyond_the_failsafe_limit_are_one);
     RUN_TEST(test_a_failsafe_limit_that_fell_leaves_five_seconds_to_who_can_be_reached);
     RUN_TEST(test_setpoints_of_phases_that_differ_too_much_are_a_violation);
+    RUN_TEST(test_a_setpoint_for_one_of_three_phases_is_held_against_the_other_two);
     RUN_TEST(test_pairs_load_the_delta_side_of_their_transformer);
     RUN_TEST(test_what_is_really_drawn_has_to_come_back_within_25_seconds);
     RUN_TEST(test_over_draw_that_nobody_can_see_is_not_held_against_the_station);

@@ -121,6 +121,39 @@ static void test_current_for_a_session_that_nobody_told_is_a_violation(void) {
     expect_objection(bench_frame_with(0, 6000, 56, 8, 9), RULE_SESSION);
 }
 
+static void test_current_for_a_session_of_which_a_part_was_told_is_a_violation(void) {
+    bench_param(0, 0, 1, 9);
+    bench_param(0, 1, 1, 9);
+    expect_objection(bench_frame_with(0, 6000, 56, 8, 9), RULE_SESSION);
+}
+
+static void test_current_for_a_session_whose_parts_differ_is_a_violation(void) {
+    bench_param(0, 0, 1, 9);
+    bench_param(0, 1, 1, 8);
+    bench_param(0, 2, 1, 0);
+    expect_objection(bench_frame_with(0, 6000, 56, 8, 9), RULE_SESSION);
+    setUp();
+    bench_param(0, 0, 1, 9);
+    bench_param(0, 1, 1, 9);
+    bench_param(0, 2, 2, 0);
+    expect_objection(bench_frame_with(0, 6000, 56, 8, 9), RULE_SESSION);
+}
+
+static void test_a_session_holds_until_another_one_was_told_whole(void) {
+    for (uint8_t session = 8; session < 11;
+         session++) { /* connectors that begin anew, and frames that get lost */
+        bench_param(0, 0, session, session);
+        bench_param(0, 1, session, session);
+    }
+    taper_frame_t frame = bench_frame(0, 6000, 0);
+    account_sent(&account, &frame);
+    bench_content();
+    bench_param(0, 2, 10, 0);
+    frame = bench_frame_with(0, 6000, 56, 8, 10);
+    account_sent(&account, &frame);
+    bench_content();
+}
+
 static void test_current_for_nobody_is_a_violation(void) {
     expect_objection(bench_frame_with(0, 6000, 56, 8, 0), RULE_SESSION);
 }
@@ -157,6 +190,9 @@ int main(void) {
     RUN_TEST(test_a_fallback_current_that_the_description_does_not_allow_is_a_violation);
     RUN_TEST(test_a_phase_mask_that_is_not_the_connectors_is_a_violation);
     RUN_TEST(test_current_for_a_session_that_nobody_told_is_a_violation);
+    RUN_TEST(test_current_for_a_session_of_which_a_part_was_told_is_a_violation);
+    RUN_TEST(test_current_for_a_session_whose_parts_differ_is_a_violation);
+    RUN_TEST(test_a_session_holds_until_another_one_was_told_whole);
     RUN_TEST(test_current_for_nobody_is_a_violation);
     RUN_TEST(test_current_longer_than_a_tick_after_the_vehicle_left_is_a_violation);
     return UNITY_END();

@@ -194,11 +194,11 @@ static void test_what_was_told_stays_whatever_the_rank_becomes(void) {
     assert_chosen(10000, 10000, 0, 6000);
 }
 
-static void test_when_the_failsafe_limit_falls_the_last_of_the_rank_lose_it(void) {
+static void test_when_the_failsafe_limit_falls_the_last_of_the_rank_lose_it_once_all_gave_up(void) {
     choose(W_of_dA(340));
     send_and_echo_all();
     choose(W_of_dA(264));
-    assert_chosen(10000, 10000, 6000, 0);
+    assert_chosen(0, 0, 0, 0);
     send_and_echo_all();
     choose(W_of_dA(264)); /* all that counts is what was told now */
     assert_chosen(10000, 10000, 6000, 0);
@@ -206,21 +206,16 @@ static void test_when_the_failsafe_limit_falls_the_last_of_the_rank_lose_it(void
     assert_chosen(10000, 10000, 6500, 0);
 }
 
-static void test_while_the_sum_is_above_the_limit_nobody_is_told_more_than_last(void) {
+static void test_while_the_sum_is_above_the_limit_nobody_is_told_any(void) {
     choose(W_of_dA(340));
     send_and_echo_all();
     choose(W_of_dA(180));
-    assert_chosen(10000, 8000, 0, 0);
-    send(0);
-    send(1);
-    send(2);
-    send(3);
-    rank[0] = 3;
-    rank[3] = 0;
-    choose(W_of_dA(180)); /* nothing was echoed: 34 A may still be told */
-    assert_chosen(10000, 8000, 0, 0);
-    choose(W_of_dA(340) - 1);
-    assert_chosen(10000, 8000, 0, 0);
+    assert_chosen(0, 0, 0, 0);
+    for (uint8_t i = 0; i < 4; i++) {
+        send(i);
+    }
+    choose(W_of_dA(340) - 1); /* nothing was echoed: 34 A may still be told */
+    assert_chosen(0, 0, 0, 0);
     choose(W_of_dA(340)); /* no more than counts already */
     assert_chosen(10000, 10000, 8000, 6000);
 }
@@ -323,46 +318,43 @@ static void test_whatever_happens_the_sum_is_within_a_constant_limit(void) {
 static void test_when_the_failsafe_limit_falls_who_can_be_reached_gives_up_for_who_cannot(void) {
     choose(W_of_dA(340));
     send_and_echo_all();
-    now_ms += EXPIRED_ms;
-    taper_ledger_update(&ledger, now_ms);
-    for (uint8_t i = 0; i < 3; i++) { /* the last one hears nothing, and keeps 6 A */
+    for (uint8_t i = 0; i < 2;
+         i++) { /* the other two do not answer, and their setpoints did not run out yet */
+        choose(W_of_dA(160));
+        assert_chosen(0, 0, 0, 0);
         send(i);
         echo(i);
     }
-    choose(W_of_dA(160));
-    assert_chosen(10000, 0, 0, 6000);
+    choose(W_of_dA(140) - 1);
+    assert_chosen(0, 0, 0, 0);
+    choose(W_of_dA(140)); /* what they hold fits by now */
+    assert_chosen(0, 0, 8000, 6000);
 }
 
-static void test_who_cannot_be_reached_and_is_told_the_same_again_takes_nothing_more(void) {
+static void test_after_a_bus_that_was_off_each_that_is_reached_gives_up_until_the_rest_fits(void) {
     choose(W_of_dA(340));
     send_and_echo_all();
     now_ms += EXPIRED_ms;
     taper_ledger_update(&ledger, now_ms);
-    for (uint8_t i = 1; i < 4; i++) { /* the first one hears nothing, and keeps 10 A */
+    for (uint8_t i = 0; i < 2; i++) {
+        choose(W_of_dA(160));
+        assert_chosen(0, 0, 0, 0);
         send(i);
         echo(i);
     }
-    choose(W_of_dA(280));
-    assert_chosen(10000, 10000, 8000, 0);
+    choose(W_of_dA(160));
+    assert_chosen(0, 0, 8000, 6000);
 }
 
-static void test_those_who_cannot_be_reached_are_told_no_more_than_fits_for_when_they_can(void) {
+static void test_who_cannot_be_reached_and_is_told_less_frees_nothing_before_he_is_heard(void) {
     choose(W_of_dA(340));
     send_and_echo_all();
     now_ms += EXPIRED_ms;
     taper_ledger_update(&ledger, now_ms);
-    choose(W_of_dA(160));
-    assert_chosen(10000, 6000, 0, 0);
-}
-
-static void test_beside_those_who_cannot_be_reached_nothing_is_added_while_they_hold_more_than_the_limit(
-    void) {
-    connectors[0].fallback_mA = 7499;
-    taper_ledger_init(&ledger, &config, VALIDITY_ms, 1, now_ms); /* may have been told in an earlier life */
-    connectors[0].fallback_mA = 7500;
-    taper_ledger_sent(&ledger, 0, 0, 32000, 7500, now_ms);
-    choose(W_of_dA(75));
-    assert_chosen(7000, 0, 0, 0);
+    granted.current_mA[0] = 6000;
+    connectors[1].fallback_mA = 14000;
+    choose(W_of_dA(340));
+    assert_chosen(6000, 10000, 8000, 6000);
 }
 
 int main(void) {
@@ -376,8 +368,8 @@ int main(void) {
     RUN_TEST(test_who_may_still_be_told_an_old_one_counts_with_it);
     RUN_TEST(test_a_silent_connector_counts_with_what_it_was_told_last_for_ever);
     RUN_TEST(test_what_was_told_stays_whatever_the_rank_becomes);
-    RUN_TEST(test_when_the_failsafe_limit_falls_the_last_of_the_rank_lose_it);
-    RUN_TEST(test_while_the_sum_is_above_the_limit_nobody_is_told_more_than_last);
+    RUN_TEST(test_when_the_failsafe_limit_falls_the_last_of_the_rank_lose_it_once_all_gave_up);
+    RUN_TEST(test_while_the_sum_is_above_the_limit_nobody_is_told_any);
     RUN_TEST(test_after_a_start_what_an_earlier_life_told_counts_until_it_is_heard_to_be_over);
     RUN_TEST(test_power_counts_as_it_is_booked);
     RUN_TEST(test_a_rank_that_names_nobody_or_one_twice_harms_nobody);
@@ -386,8 +378,7 @@ int main(void) {
     RUN_TEST(test_a_connector_that_costs_nothing_is_bounded_by_nothing);
     RUN_TEST(test_whatever_happens_the_sum_is_within_a_constant_limit);
     RUN_TEST(test_when_the_failsafe_limit_falls_who_can_be_reached_gives_up_for_who_cannot);
-    RUN_TEST(test_who_cannot_be_reached_and_is_told_the_same_again_takes_nothing_more);
-    RUN_TEST(test_those_who_cannot_be_reached_are_told_no_more_than_fits_for_when_they_can);
-    RUN_TEST(test_beside_those_who_cannot_be_reached_nothing_is_added_while_they_hold_more_than_the_limit);
+    RUN_TEST(test_after_a_bus_that_was_off_each_that_is_reached_gives_up_until_the_rest_fits);
+    RUN_TEST(test_who_cannot_be_reached_and_is_told_less_frees_nothing_before_he_is_heard);
     return UNITY_END();
 }

@@ -48,31 +48,37 @@ static void test_the_guard_refuses_what_is_above_its_setpoint_or_below_nothing(v
     TEST_ASSERT_FALSE(passes(10000));
 }
 
-static void test_the_guard_refuses_a_sum_above_the_limit_unless_it_was_as_high_before(void) {
+static void test_the_guard_refuses_any_while_the_sum_of_all_that_may_have_been_told_is_above_the_limit(void) {
     fallback.current_mA[0] = fallback.current_mA[3] = 10000;
     TEST_ASSERT_TRUE(passes(W_of_dA(200)));
     TEST_ASSERT_FALSE(passes(W_of_dA(200) - 1));
     taper_ledger_sent(&ledger, 0, 0, 32000, 10000, NOW_ms);
-    TEST_ASSERT_FALSE(passes(W_of_dA(200) - 1));
     taper_ledger_sent(&ledger, 3, 0, 32000, 10000, NOW_ms);
-    TEST_ASSERT_TRUE(passes(0));
-    TEST_ASSERT_TRUE(passes(-1000));
-    fallback.current_mA[3] = 10100;
-    TEST_ASSERT_FALSE(passes(0));
+    TEST_ASSERT_TRUE(passes(W_of_dA(200)));
+    TEST_ASSERT_FALSE(passes(W_of_dA(200) - 1));
+    fallback.current_mA[0] = 0; /* may have been told still */
+    TEST_ASSERT_FALSE(passes(W_of_dA(200) - 1));
     TEST_ASSERT_FALSE(passes(-1000));
-    fallback.current_mA[0] = 0; /* may be told still */
-    TEST_ASSERT_FALSE(passes(W_of_dA(201) - 1));
-    TEST_ASSERT_TRUE(passes(W_of_dA(201)));
+    fallback.current_mA[3] = 0;
+    TEST_ASSERT_TRUE(passes(W_of_dA(200) - 1));
+    TEST_ASSERT_TRUE(passes(-1000));
 }
 
-static void test_the_guard_refuses_a_milliwatt_more_than_before(void) {
+static void test_the_guard_refuses_a_milliwatt_more_than_the_limit(void) {
     connectors[0].voltage_mV = 1000; /* 1 W for 1 A */
     snapshot.demand[0] = (taper_demand_t){0};
-    taper_ledger_sent(&ledger, 0, 0, 32000, 10000, NOW_ms);
+    fallback.current_mA[0] = 10000;
+    TEST_ASSERT_TRUE(passes(10));
+    fallback.current_mA[0] = 10001;
+    TEST_ASSERT_FALSE(passes(10));
+}
+
+static void test_without_a_failsafe_limit_the_guard_lets_what_costs_nothing_pass(void) {
+    connectors[0].voltage_mV = 0;
+    snapshot.demand[0] = (taper_demand_t){0};
     fallback.current_mA[0] = 10000;
     TEST_ASSERT_TRUE(passes(0));
-    fallback.current_mA[0] = 10001;
-    TEST_ASSERT_FALSE(passes(0));
+    TEST_ASSERT_TRUE(passes(-1));
 }
 
 static void test_the_guard_does_not_judge_who_is_not_there(void) {
@@ -83,8 +89,9 @@ static void test_the_guard_does_not_judge_who_is_not_there(void) {
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_the_guard_refuses_what_is_above_its_setpoint_or_below_nothing);
-    RUN_TEST(test_the_guard_refuses_a_sum_above_the_limit_unless_it_was_as_high_before);
-    RUN_TEST(test_the_guard_refuses_a_milliwatt_more_than_before);
+    RUN_TEST(test_the_guard_refuses_any_while_the_sum_of_all_that_may_have_been_told_is_above_the_limit);
+    RUN_TEST(test_the_guard_refuses_a_milliwatt_more_than_the_limit);
+    RUN_TEST(test_without_a_failsafe_limit_the_guard_lets_what_costs_nothing_pass);
     RUN_TEST(test_the_guard_does_not_judge_who_is_not_there);
     return UNITY_END();
 }

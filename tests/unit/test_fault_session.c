@@ -191,7 +191,10 @@ static void test_row_46_a_connector_of_unknown_rotation_counts_on_all_phases(voi
         tick_on_one_phase(TAPER_ROTATION_UNKNOWN);
     }
     TEST_ASSERT_EQUAL_INT32(690, demand->booking.W_per_A);
-    TEST_ASSERT_EQUAL_INT32(230, demand->W_per_A); /* planned as it draws */
+    TEST_ASSERT_EQUAL_UINT8(7, demand->booking.phases);
+    TEST_ASSERT_EQUAL_UINT8(0, demand->booking.idle);
+    TEST_ASSERT_EQUAL_UINT8(7, demand->booking.unsure); /* it balances nobody */
+    TEST_ASSERT_EQUAL_INT32(230, demand->W_per_A);      /* planned as it draws */
     TEST_ASSERT_EQUAL_UINT(1, bench_events(TAPER_EVENT_ROTATION));
     TEST_ASSERT_GREATER_THAN_INT32(0, bench_setpoint_for(1).current_mA);
     TEST_ASSERT_EQUAL_INT32(sound_mA, bench_setpoint_for(2).current_mA);

@@ -289,6 +289,17 @@ static void test_a_setpoint_that_expired_is_not_told_again_without_room(void) {
     TEST_ASSERT_EQUAL_INT32(20000, granted.current_mA[1]);
 }
 
+static void test_below_a_row_that_is_overdrawn_who_ran_out_of_setpoints_is_told_nothing(void) {
+    taper_ledger_sent(&ledger, 0, 0, 6000, 6000, now_ms);
+    wait_ms(EXPIRED_ms); /* he draws 6 A if that arrived, or else nothing */
+    send(1, 0, 16000);
+    target.current_mA[0] = 6000;
+    grant(22 * 230 - 1);
+    TEST_ASSERT_EQUAL_INT32(0, granted.current_mA[0]);
+    grant(22 * 230);
+    TEST_ASSERT_EQUAL_INT32(6000, granted.current_mA[0]);
+}
+
 static void test_a_rank_that_names_nobody_or_one_twice_harms_nobody(void) {
     target.current_mA[0] = target.current_mA[1] = 16000;
     rank[0] = 4;
@@ -374,6 +385,7 @@ int main(void) {
     RUN_TEST(test_a_feeder_holds_its_own_connectors_back_only);
     RUN_TEST(test_while_the_sum_is_above_a_limit_that_fell_nobody_is_told_more_than_last);
     RUN_TEST(test_a_setpoint_that_expired_is_not_told_again_without_room);
+    RUN_TEST(test_below_a_row_that_is_overdrawn_who_ran_out_of_setpoints_is_told_nothing);
     RUN_TEST(test_a_rank_that_names_nobody_or_one_twice_harms_nobody);
     RUN_TEST(test_who_is_ranked_twice_takes_its_room_once_and_who_stands_behind_the_last_place_none);
     RUN_TEST(test_what_a_silent_connector_may_draw_counts_by_its_description);

@@ -135,11 +135,51 @@ static void test_the_next_vehicle_begins_with_all_phases(void) {
     TEST_ASSERT_GREATER_OR_EQUAL_INT32(6000, current_mA(1));
 }
 
+/** What the setpoints of vehicles 1 and 2 put on L1 and L2 by their phase masks. */
+static int32_t apart_mA(void) {
+    const int32_t all_mA = current_mA(1); /* on L1, if no more */
+    const bool three = bench.setpoint[1].phase_mask == 7;
+    const int32_t line_mA[3] = {all_mA, current_mA(2) + (three ? all_mA : 0), three ? all_mA : 0};
+    const int32_t most_mA = taper_max_i32(line_mA[0], line_mA[1]); /* L3 has the least */
+    return taper_max_i32(most_mA, line_mA[2]) - taper_min_i32(line_mA[2], line_mA[0]);
+}
+
+static void test_a_setpoint_for_fewer_phases_than_before_does_not_balance_those_it_left(void) {
+    groups[0].limit_mA = 0;
+    groups[0].imbalance_mA = 10000;
+    phases[1] = 3;
+    run_ticks(20);
+    TEST_ASSERT_GREATER_THAN_INT32(10000, current_mA(1));
+    TEST_ASSERT_EQUAL_INT32(10000, current_mA(2));
+    for (unsigned k = 0; k < 40; k++) {
+        phases[1] = k < 20 ? 1 : 3;
+        tick();
+        TEST_ASSERT_LESS_OR_EQUAL_INT32(10000, apart_mA());
+        TEST_ASSERT_GREATER_OR_EQUAL_INT32(10000,
+                                           current_mA(1)); /* nobody has to make room for what it left */
+        TEST_ASSERT_EQUAL_INT32(10000, current_mA(2));
+    }
+}
+
+static void test_another_phase_mask_goes_out_at_once_though_the_current_stays(void) {
+    phases[1] = 3;
+    run_ticks(20);
+    bench_poll(250); /* all setpoints go out, and are not due again for half a second */
+    const int32_t before_mA = current_mA(1);
+    TEST_ASSERT_EQUAL_UINT8(7, bench.setpoint[1].phase_mask);
+    phases[1] = 1;
+    tick();
+    TEST_ASSERT_EQUAL_INT32(before_mA, current_mA(1));
+    TEST_ASSERT_EQUAL_UINT8(1, bench.setpoint[1].phase_mask);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_phases_that_a_setpoint_allows_are_not_given_away_before_it_is_over);
     RUN_TEST(test_phases_that_come_into_use_again_meanwhile_are_still_there);
     RUN_TEST(test_a_setpoint_allows_more_phases_only_when_others_have_left_them);
     RUN_TEST(test_the_next_vehicle_begins_with_all_phases);
+    RUN_TEST(test_another_phase_mask_goes_out_at_once_though_the_current_stays);
+    RUN_TEST(test_a_setpoint_for_fewer_phases_than_before_does_not_balance_those_it_left);
     return UNITY_END();
 }

@@ -12,6 +12,11 @@ typedef struct {
     int32_t *current_mA;
 } balance_t;
 
+/** What setpoints put on the phases of a group, at most and at least: wirings may not be known. */
+typedef struct {
+    int64_t most_uA[PHASES], least_uA[PHASES];
+} sums_t;
+
 /** A group whose phases differ too much. */
 typedef struct {
     uint8_t group;
@@ -19,8 +24,14 @@ typedef struct {
     int64_t excess_uA;    /* <= 0: nothing to do */
 } tilt_t;
 
+/** That its setpoint may be on. */
 static unsigned phases_of(const balance_t *balance, uint8_t i) {
-    return balance->rows->booking[i].phases & 7u;
+    return balance->rows->booking[i].phases & ~(unsigned)balance->rows->booking[i].idle & 7u;
+}
+
+/** That it is on for sure. */
+static unsigned sure_phases_of(const balance_t *balance, uint8_t i) {
+    return phases_of(balance, i) & ~(unsigned)balance->rows->booking[i].unsure;
 }
 
 static int32_t permille_of(const balance_t *balance, uint8_t i) {
@@ -45,56 +56,58 @@ static void order_all(balance_t *balance, const uint8_t *rank) {
     }
 }
 
-/** Add all currents to `sum_uA`, which is 0, by group and phase. */
-static void sum_phases(const balance_t *balance, int64_t sum_uA[TAPER_MAX_GROUPS][PHASES]) {
-    const taper_station_config_t *config = balance->config;
-    for (uint8_t i = 0; i < config->connector_count; i++) {
-        for (unsigned phase = 0; phase < PHASES; phase++) {
-            if ((phases_of(balance, i) >> phase & 1u) != 0u) {
-                sum_uA[config->connectors[i].group][phase] +=
-                    (int64_t)balance->current_mA[i] * permille_of(balance, i);
-            }
-        }
-    }
-    for (uint8_t k = config->group_count; k-- > 0;) { /* children stand behind their parents */
-        const uint8_t parent = config->groups[k].parent;
-        for (unsigned phase = 0; phase < PHASES && parent != TAPER_NO_GROUP; phase++) {
-            sum_uA[parent][phase] += sum_uA[k][phase];
-        }
+static void add_connector(const balance_t *balance, uint8_t i, sums_t *sums) {
+    const int64_t current_uA = (int64_t)balance->current_mA[i] * permille_of(balance, i);
+    for (unsigned phase = 0; phase < PHASES; phase++) {
+        sums->most_uA[phase] += (phases_of(balance, i) >> phase & 1u) != 0u ? current_uA : 0;
+        sums->least_uA[phase] += (sure_phases_of(balance, i) >> phase & 1u) != 0u ? current_uA : 0;
     }
 }
 
-static tilt_t tilt_of(const balance_t *balance, uint8_t k, const int64_t *sum_uA) {
-    unsigned strong = 0;
-    unsigned weak = 0;
-    for (unsigned phase = 1; phase < PHASES; phase++) {
-        strong = sum_uA[phase] > sum_uA[strong] ? phase : strong;
-        weak = sum_uA[phase] < sum_uA[weak] ? phase : weak;
+static sums_t sums_of(const balance_t *balance, uint8_t group) {
+    sums_t sums = {{0}, {0}};
+    for (uint8_t i = 0; i < balance->config->connector_count; i++) {
+        if (taper_group_contains(balance->config, group, i)) {
+            add_connector(balance, i, &sums);
+        }
     }
-    const int32_t limit_mA = taper_row_limit(balance->config, k, TAPER_ROW_L1_L2);
-    return (tilt_t){.group = k,
-                    .strong = (uint8_t)(1u << strong),
-                    .weak = (uint8_t)(1u << weak),
-                    .excess_uA = sum_uA[strong] - sum_uA[weak] - (int64_t)limit_mA * 1000};
+    return sums;
+}
+
+/** The two phases that may differ most; of those alike the first. */
+static tilt_t tilt_of(const balance_t *balance, uint8_t k) {
+    const sums_t sums = sums_of(balance, k);
+    tilt_t tilt = {.group = k, .excess_uA = INT64_MIN};
+    for (unsigned pair = 0; pair < PHASES * (PHASES - 1u); pair++) {
+        const unsigned strong = pair / (PHASES - 1u);
+        const unsigned other = pair % (PHASES - 1u);
+        const unsigned weak = other < strong ? other : other + 1u;
+        const int64_t apart_uA = sums.most_uA[strong] - sums.least_uA[weak];
+        if (apart_uA > tilt.excess_uA) {
+            tilt.strong = (uint8_t)(1u << strong);
+            tilt.weak = (uint8_t)(1u << weak);
+            tilt.excess_uA = apart_uA;
+        }
+    }
+    tilt.excess_uA -= (int64_t)balance->config->groups[k].imbalance_mA * 1000;
+    return tilt;
 }
 
 /** The first group from the leaves up that tilts: what helps it may help those above. */
 static tilt_t find_tilt(const balance_t *balance) {
-    int64_t sum_uA[TAPER_MAX_GROUPS][PHASES] = {0};
-    sum_phases(balance, sum_uA);
-    for (uint8_t k = balance->config->group_count; k-- > 0;) {
-        const tilt_t tilt = tilt_of(balance, k, sum_uA[k]);
-        if (tilt.excess_uA > 0) {
-            return tilt;
+    tilt_t tilt = {.excess_uA = 0};
+    for (uint8_t k = balance->config->group_count; k-- > 0 && tilt.excess_uA <= 0;) {
+        if (balance->config->groups[k].imbalance_mA != 0) {
+            tilt = tilt_of(balance, k);
         }
     }
-    return (tilt_t){.excess_uA = 0};
+    return tilt;
 }
 
-/** Whether less current of this connector makes the tilt less: it is on the strong phase, and not on the weak one. */
+/** Whether less current of this connector makes the tilt less: it may be on the strong phase, and not on the weak one. */
 static bool helps(const balance_t *balance, const tilt_t *tilt, uint8_t i) {
     return balance->current_mA[i] > 0 && permille_of(balance, i) > 0 &&
-           (phases_of(balance, i) & tilt->strong) != 0 && (phases_of(balance, i) & tilt->weak) == 0 &&
+           (phases_of(balance, i) & tilt->strong) != 0 && (sure_phases_of(balance, i) & tilt->weak) == 0 &&
            taper_group_contains(balance->config, tilt->group, i);
 }
 
@@ -119,25 +132,33 @@ static void switch_off(balance_t *balance, tilt_t *tilt, uint8_t i) {
     lower_to(balance, tilt, i, 0);
 }
 
-static bool is_one_phase(const balance_t *balance, uint8_t i) {
-    return (phases_of(balance, i) & (phases_of(balance, i) - 1u)) == 0u;
+/** In the order in which they are cut: less of what is unsure helps between any two phases, and costs no other. */
+typedef enum { UNSURE, ON_ONE_PHASE, ON_MORE, KINDS } kind_t;
+
+static kind_t kind_of(const balance_t *balance, uint8_t i) {
+    const unsigned phases = phases_of(balance, i);
+    if (sure_phases_of(balance, i) != phases) {
+        return UNSURE;
+    }
+    return (phases & (phases - 1u)) == 0u ? ON_ONE_PHASE : ON_MORE;
 }
 
 typedef void cut_t(balance_t *balance, tilt_t *tilt, uint8_t i);
 
-/** Cut those on one phase, or on two, that help, from the last one up. */
-static void cut_those(balance_t *balance, tilt_t *tilt, bool one_phase, cut_t *how) {
+/** Cut those of a kind that help, from the last one up. */
+static void cut_those(balance_t *balance, tilt_t *tilt, kind_t kind, cut_t *how) {
     for (uint8_t place = balance->config->connector_count; place-- > 0 && tilt->excess_uA > 0;) {
         const uint8_t i = balance->order[place];
-        if (helps(balance, tilt, i) && is_one_phase(balance, i) == one_phase) {
+        if (helps(balance, tilt, i) && kind_of(balance, i) == kind) {
             how(balance, tilt, i);
         }
     }
 }
 
 static void cut(balance_t *balance, tilt_t *tilt, cut_t *how) {
-    cut_those(balance, tilt, true, how);
-    cut_those(balance, tilt, false, how);
+    for (unsigned kind = 0; kind < KINDS; kind++) {
+        cut_those(balance, tilt, (kind_t)kind, how);
+    }
 }
 
 void taper_balance(const taper_station_config_t *config, const taper_snapshot_t *snapshot,
@@ -151,9 +172,10 @@ void taper_balance(const taper_station_config_t *config, const taper_snapshot_t 
     balance.rows = rows;
     balance.current_mA = setpoints->current_mA;
     order_all(&balance, rank);
-    /* It ends: while a group tilts, somebody on its strong phase and not on its weak one has current, so every round lowers
-     * somebody. A group needs two rounds, one for each phase above its weakest, but groups within groups could pass small cuts
-     * to and fro; so after as many rounds as that takes, and one per connector, each switches at least one of them off. */
+    /* It ends: while a group tilts, somebody on its strong phase and not for sure on its weak one has current, so every round
+     * lowers somebody. A group needs two rounds, one for each phase above its weakest, but groups within groups, and currents of
+     * unsure phases, could pass small cuts to and fro; so after as many rounds as that takes, and one per connector, each
+     * switches at least one of them off. */
     const unsigned lowering = config->connector_count + 2u * config->group_count;
     unsigned rounds = 0;
     for (tilt_t tilt = find_tilt(&balance); tilt.excess_uA > 0; tilt = find_tilt(&balance)) {

@@ -42,11 +42,15 @@ static int32_t whole_or_none_mA(const taper_snapshot_t *snapshot, uint8_t i, int
     return current_mA < snapshot->demand[i].min_mA ? 0 : current_mA - current_mA % TAPER_CURRENT_STEP_mA;
 }
 
-/** What needs no room, whatever others draw: no more than it was told last, and may still draw by that. */
+/**
+ * What needs no room, whatever others draw: no more than it was told last, and may still draw by that. Whose setpoints ran out
+ * may have heard none of these, and draw nothing: what he is told then is an increase.
+ */
 static int32_t kept_mA(const grant_t *grant, uint8_t i, int32_t target_mA) {
     const int32_t last_mA =
         taper_min_i32(grant->ledger->entry[i].last_mA, taper_ledger_told_mA(grant->ledger, i));
-    return whole_or_none_mA(grant->snapshot, i, taper_min_i32(target_mA, last_mA));
+    const bool is_heard = taper_ledger_unreached_mA(grant->ledger, i) == 0;
+    return is_heard ? whole_or_none_mA(grant->snapshot, i, taper_min_i32(target_mA, last_mA)) : 0;
 }
 
 /** The most up to `target_mA` that fits. Nothing does below a row that is overdrawn. */

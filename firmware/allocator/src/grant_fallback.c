@@ -33,34 +33,11 @@ static int32_t held_mA(int64_t room_mW, int32_t W_per_A) {
     return W_per_A == 0 ? INT32_MAX : taper_saturate_i32(taper_quotient(room_mW, W_per_A));
 }
 
-/** Who accepted nothing for so long that his setpoints ran out keeps this, whatever he is told now. */
-static int32_t stuck_mA(const choice_t *choice, uint8_t i) {
-    return choice->ledger->entry[i].over_fallback_mA;
-}
-
-/** What is left of the failsafe limit: by what everybody is told, and beside what is stuck. */
-typedef struct {
-    int64_t told_mW, beside_mW; /**< the latter can be negative: the limit fell */
-} budget_t;
-
-/** Tell it again what it was told last, as far as all of these fit together, and beside what is stuck. */
-static void keep(const choice_t *choice, uint8_t i, budget_t *budget) {
-    const int32_t W_per_A = weight_W_per_A(choice, i);
-    const int32_t paid_mA = stuck_mA(choice, i);
-    const int32_t more_mA = taper_max_i32(held_mA(budget->beside_mW, W_per_A), 0);
-    const int32_t beside_mA = taper_saturate_i32((int64_t)paid_mA + more_mA);
-    const int32_t most_mA = taper_min_i32(held_mA(budget->told_mW, W_per_A), beside_mA);
-    const int32_t last_mA = taper_min_i32(wanted_mA(choice, i), choice->ledger->entry[i].last_fallback_mA);
-    const int32_t kept_mA = whole_or_none_mA(choice, i, taper_min_i32(last_mA, most_mA));
-    choice->fallback->current_mA[i] = kept_mA;
-    budget->told_mW -= (int64_t)W_per_A * kept_mA;
-    budget->beside_mW -= (int64_t)W_per_A * taper_max_i32(kept_mA - paid_mA, 0);
-}
-
 static int32_t booked_mA(const choice_t *choice, uint8_t i) {
     return taper_max_i32(taper_ledger_fallback_mA(choice->ledger, i), choice->fallback->current_mA[i]);
 }
 
+/** Up to what it may have been told it takes no room: nobody loses what he has to a higher rank. */
 static void raise_one(const choice_t *choice, uint8_t i, int64_t *room_mW) {
     const int32_t W_per_A = weight_W_per_A(choice, i);
     const int32_t before_mA = booked_mA(choice, i);
@@ -77,22 +54,12 @@ void taper_ledger_grant_fallback(const taper_ledger_t *ledger, const taper_stati
                                  const uint8_t *rank, int32_t failsafe_W, const taper_setpoints_t *granted,
                                  taper_setpoints_t *fallback) {
     const choice_t choice = {ledger, config, snapshot, rows, granted, fallback};
-    const int64_t failsafe_mW = (int64_t)taper_max_i32(failsafe_W, 0) * 1000;
-    budget_t budget = {.told_mW = failsafe_mW, .beside_mW = failsafe_mW};
-    int64_t room_mW = failsafe_mW;
+    int64_t room_mW = (int64_t)taper_max_i32(failsafe_W, 0) * 1000;
     for (uint8_t i = 0; i < config->connector_count; i++) {
+        room_mW -= (int64_t)weight_W_per_A(&choice, i) * taper_ledger_fallback_mA(ledger, i);
         fallback->current_mA[i] = 0;
-        budget.beside_mW -= (int64_t)weight_W_per_A(&choice, i) * stuck_mA(&choice, i);
     }
-    for (uint8_t place = 0; place < config->connector_count; place++) {
-        /* A rank binds nobody: it may name a connector twice, or one that there is not. */
-        if (rank[place] < config->connector_count && fallback->current_mA[rank[place]] == 0) {
-            keep(&choice, rank[place], &budget);
-        }
-    }
-    for (uint8_t i = 0; i < config->connector_count; i++) {
-        room_mW -= (int64_t)weight_W_per_A(&choice, i) * booked_mA(&choice, i);
-    }
+    /* A rank binds nobody: it may name a connector twice, or one that there is not. */
     for (uint8_t place = 0; place < config->connector_count && room_mW >= 0; place++) {
         if (rank[place] < config->connector_count) {
             raise_one(&choice, rank[place], &room_mW);

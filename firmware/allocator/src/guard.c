@@ -13,6 +13,8 @@ typedef struct {
     int64_t power_mW;
     int64_t line_uA[LINES]; /* to neutral, or of three phases, or of a wiring that is not known: L1, L2, L3 */
     int64_t pair_uA[LINES]; /* between two lines: L1-L2, L2-L3, L3-L1 */
+    int64_t idle_uA[LINES]; /* of these on each line: what setpoints do not put there */
+    int64_t unsure_uA[LINES]; /* and what they may not put there */
 } load_t;
 
 static bool connector_passes(const taper_connector_config_t *connector, const taper_demand_t *demand,
@@ -79,6 +81,10 @@ static taper_booking_t booking_of(const taper_station_config_t *config, const ta
 static void add_current(load_t *load, const taper_booking_t *booking, int32_t current_mA) {
     const int64_t current_uA = (int64_t)current_mA * booking->permille;
     load->power_mW += (int64_t)current_mA * booking->W_per_A;
+    for (unsigned line = 0; line < LINES && booking->unsure != 0; line++) {
+        load->idle_uA[line] += (booking->idle >> line & 1u) != 0u ? current_uA : 0;
+        load->unsure_uA[line] += (booking->unsure >> line & 1u) != 0u ? current_uA : 0;
+    }
     for (unsigned line = 0; line < LINES; line++) {
         const unsigned pair = 1u << line | 1u << (line + 1) % LINES;
         if (booking->line_to_line && booking->phases == pair) {
@@ -96,6 +102,8 @@ static void add_load(load_t *sum, const load_t *load) {
     for (unsigned line = 0; line < LINES; line++) {
         sum->line_uA[line] += load->line_uA[line];
         sum->pair_uA[line] += load->pair_uA[line];
+        sum->idle_uA[line] += load->idle_uA[line];
+        sum->unsure_uA[line] += load->unsure_uA[line];
     }
 }
 
@@ -141,15 +149,19 @@ static bool delta_passes(const load_t *load, unsigned line, int32_t limit_mA) {
 }
 
 /** Current on a line as it counts for imbalance: pairs count on both of their lines. */
-static int64_t setpoints_uA(const load_t *load, unsigned line) {
+static int64_t booked_uA(const load_t *load, unsigned line) {
     return load->line_uA[line] + load->pair_uA[line] + load->pair_uA[(line + 2) % LINES];
 }
 
+/** The most that setpoints put on a line, against the least on another one. */
 static bool balance_passes(const load_t *load, int32_t limit_mA) {
-    for (unsigned line = 0; line < LINES; line++) {
-        const int64_t more_uA = setpoints_uA(load, line) - setpoints_uA(load, (line + 1) % LINES);
-        const int64_t limit_uA = (int64_t)limit_mA * 1000;
-        if (more_uA > limit_uA || more_uA < -limit_uA) {
+    const int64_t limit_uA = (int64_t)limit_mA * 1000;
+    for (unsigned pair = 0; pair < LINES * (LINES - 1); pair++) {
+        const unsigned more = pair % LINES;
+        const unsigned less = (more + 1 + pair / LINES) % LINES;
+        const int64_t most_uA = booked_uA(load, more) - load->idle_uA[more];
+        const int64_t least_uA = booked_uA(load, less) - load->unsure_uA[less];
+        if (most_uA - least_uA > limit_uA) {
             return false;
         }
     }

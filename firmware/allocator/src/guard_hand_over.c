@@ -208,17 +208,16 @@ bool taper_guard_hand_over_passes(const taper_ledger_t *ledger, const taper_stat
 bool taper_guard_fallback_passes(const taper_ledger_t *ledger, const taper_station_config_t *config,
                                  const taper_snapshot_t *snapshot, int32_t failsafe_W,
                                  const taper_setpoints_t *granted, const taper_setpoints_t *fallback) {
-    int64_t before_mW = 0;
     int64_t after_mW = 0;
+    bool is_told = false;
     for (uint8_t i = 0; i < config->connector_count; i++) {
         const int32_t W_per_A = power_W_per_A(&config->connectors[i], &snapshot->demand[i]);
-        const int32_t before_mA = taper_ledger_fallback_mA(ledger, i);
         const int32_t told_mA = fallback->current_mA[i];
         if (told_mA < 0 || told_mA > granted->current_mA[i]) {
             return false;
         }
-        before_mW += (int64_t)W_per_A * before_mA;
-        after_mW += (int64_t)W_per_A * taper_max_i32(told_mA, before_mA);
+        is_told = is_told || told_mA > 0;
+        after_mW += (int64_t)W_per_A * taper_max_i32(told_mA, taper_ledger_fallback_mA(ledger, i));
     }
-    return power_passes(before_mW, after_mW, failsafe_W);
+    return !is_told || after_mW <= (int64_t)taper_max_i32(failsafe_W, 0) * 1000;
 }

@@ -62,9 +62,20 @@ static void note_open(taper_ledger_entry_t *entry) {
     entry->open_fallback_mA = most_fallback_dA * TAPER_CURRENT_STEP_mA;
 }
 
+/** A counter that it echoes already proves nothing when it is used. */
+static void note_unproven(taper_ledger_entry_t *entry, uint8_t counter) {
+    const uint8_t name = (uint8_t)(counter + 1u);
+    if (entry->reported == name) {
+        entry->unproven = name;
+    } else if (entry->unproven == name) {
+        entry->unproven = 0;
+    }
+}
+
 void taper_ledger_sent(taper_ledger_t *ledger, uint8_t connector, uint8_t counter, int32_t current_mA,
                        int32_t fallback_mA, uint32_t now_ms) {
     taper_ledger_entry_t *entry = &ledger->entry[connector];
+    note_unproven(entry, counter);
     entry->sent_dA[counter] = (uint16_t)(current_mA / TAPER_CURRENT_STEP_mA);
     entry->fallback_dA[counter] = (uint16_t)(fallback_mA / TAPER_CURRENT_STEP_mA);
     entry->sent_ms[counter] = now_ms;
@@ -144,6 +155,7 @@ static void close_unheard(taper_ledger_entry_t *entry, unsigned c) {
 
 /** The connector fell back, so all that had arrived when it said so is over. */
 static void hear_fallback(taper_ledger_entry_t *entry, uint32_t at_ms) {
+    entry->reported = 0;
     for (unsigned c = 0; c < TAPER_LEDGER_SETPOINTS; c++) {
         if (has_bit(entry->open, c) && taper_time_reached(at_ms, entry->sent_ms[c] + CROSSING_ms)) {
             close_unheard(entry, c);
@@ -162,12 +174,16 @@ static bool sent_before(const taper_ledger_entry_t *entry, unsigned c, unsigned 
 
 /** An echo proves the setpoint it names, so whatever was sent before that is over, and its fallback current too. */
 static void hear_echo(taper_ledger_entry_t *entry, unsigned counter, uint32_t followed_ms) {
+    entry->reported = (uint8_t)(counter + 1u);
     if (!has_bit(entry->open, counter)) {
         return; /* an echo of long ago */
     }
     if (entry->first_echo == 0 || entry->first_echo == counter + 1u) {
         entry->first_echo = (uint8_t)(counter + 1u);
         return; /* perhaps a setpoint of the controller before us, with the same counter */
+    }
+    if (entry->unproven == entry->reported) {
+        return; /* perhaps one whose counter was corrupted */
     }
     end_unknown(entry, followed_ms);
     entry->accepts = true;

@@ -19,18 +19,14 @@ static uint32_t longest_reaction_ms(const taper_station_config_t *config) {
     return longest_ms;
 }
 
-/** Fewer than setpoints in force allow: all of these are booked. */
-static void book_what_was_told(taper_station_t *station, uint8_t i, uint32_t now_ms) {
-    taper_demand_t *demand = &station->snapshot.demand[i];
+/** Forget what setpoints allowed that are over. */
+static void forget_what_is_over(taper_station_t *station, uint8_t i, uint32_t now_ms) {
     taper_conductors_t *conductors = &station->conductors[i];
     const uint32_t reaction_ms = station->options.config->connectors[i].reaction_ms;
     const bool over = taper_elapsed_ms(now_ms, conductors->most_ms) >= over_ms(station, reaction_ms) &&
                       taper_ledger_unreached_mA(&station->ledger, i) == 0;
     if (over) {
         conductors->most = 0;
-    }
-    if (conductors->most > demand->conductors) {
-        demand->booking = taper_session_booking(&station->sessions, i, now_ms, conductors->most);
     }
 }
 
@@ -50,13 +46,24 @@ static void allow(taper_station_t *station, uint8_t i, uint32_t now_ms) {
     }
 }
 
+/** Setpoints in force, or a vehicle that is about to, may use more phases than the next setpoint allows: all of these are booked. */
+static void book(taper_station_t *station, uint8_t i, uint32_t now_ms) {
+    taper_demand_t *demand = &station->snapshot.demand[i];
+    const taper_conductors_t *conductors = &station->conductors[i];
+    const uint8_t most = (uint8_t)taper_max_i32(conductors->most, demand->conductors);
+    if (most > conductors->allowed) {
+        demand->booking = taper_session_booking(&station->sessions, i, now_ms, conductors->allowed, most);
+    }
+}
+
 void taper_phases_update(taper_station_t *station, uint8_t i, uint32_t now_ms) {
     if (!station->sessions.session[i].vehicle_there) {
         station->conductors[i] = (taper_conductors_t){0};
     }
     if (station->snapshot.demand[i].active) { /* others are booked on all they have, and told nothing */
-        book_what_was_told(station, i, now_ms);
+        forget_what_is_over(station, i, now_ms);
         allow(station, i, now_ms);
+        book(station, i, now_ms);
     }
 }
 

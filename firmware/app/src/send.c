@@ -100,6 +100,7 @@ static void send_setpoint(taper_station_t *station, uint8_t i, uint32_t now_ms) 
         station->sent_mA[i] = station->setpoints.current_mA[i];
         station->sent_fallback_mA[i] = station->fallback.current_mA[i];
         station->sent_command[i] = (uint8_t)message.as.setpoint.command;
+        station->sent_phases[i] = taper_phases_allowed(station, i);
         station->sent_session[i] = station->setpoint_session[i];
         station->sent_ms[i] = now_ms;
     }
@@ -109,6 +110,7 @@ static bool is_due(const taper_station_t *station, uint8_t i, uint32_t now_ms) {
     return station->setpoints.current_mA[i] != station->sent_mA[i] ||
            station->fallback.current_mA[i] != station->sent_fallback_mA[i] ||
            (uint8_t)command_for(station, i) != station->sent_command[i] ||
+           taper_phases_allowed(station, i) != station->sent_phases[i] ||
            station->setpoint_session[i] != station->sent_session[i] ||
            taper_elapsed_ms(now_ms, station->sent_ms[i]) >= TAPER_SETPOINT_CYCLE_ms;
 }

@@ -99,10 +99,22 @@ static uint8_t phases_booked(const taper_connector_config_t *connector, const ta
     return told == TAPER_ROTATION_UNKNOWN ? 7 : described | taper_rotation_phases(told, conductors);
 }
 
-/* What 1 A of a connector counts with `conductors` in use. One that does not know its wiring counts as three phases, in
-   power too. */
+/* Those of the first `conductors` that it has by any wiring: by the description, and by what the connector says. One that
+   does not know is sure of three only. */
+static uint8_t phases_sure(const taper_connector_config_t *connector, const taper_session_t *session,
+                           uint8_t conductors) {
+    const uint8_t described = taper_rotation_phases((taper_rotation_t)connector->rotation, conductors);
+    if (!session->info_known || conductors == 3) {
+        return described;
+    }
+    const taper_rotation_t told = (taper_rotation_t)session->info.rotation;
+    return told == TAPER_ROTATION_UNKNOWN ? 0 : described & taper_rotation_phases(told, conductors);
+}
+
+/* What 1 A of a connector counts with up to `most` conductors in use. One that does not know its wiring counts as three
+   phases, in power too. */
 taper_booking_t taper_session_booking(const taper_session_table_t *table, uint8_t connector, uint32_t now_ms,
-                                      uint8_t conductors) {
+                                      uint8_t allowed, uint8_t most) {
     const taper_connector_config_t *config = &table->config->connectors[connector];
     const taper_session_t *session = &table->session[connector];
     taper_booking_t booking = taper_booking_nominal(table->config, connector);
@@ -113,10 +125,12 @@ taper_booking_t taper_session_booking(const taper_session_table_t *table, uint8_
         booking.permille = (int32_t)(((int64_t)booking.permille * volts_V + nominal_V - 1) / nominal_V);
         return booking;
     }
-    const uint8_t wires = config->line_to_line ? 2 : conductors;
-    booking.phases = phases_booked(config, session, wires);
+    const uint8_t wires = config->line_to_line ? 2 : allowed;
+    booking.phases = phases_booked(config, session, config->line_to_line ? 2 : most);
+    booking.idle = booking.phases & ~phases_booked(config, session, wires);
+    booking.unsure = booking.phases & ~phases_sure(config, session, wires);
     const bool unknown = session->info_known && session->info.rotation == TAPER_ROTATION_UNKNOWN;
-    booking.W_per_A = volts_V * (unknown ? 3 : conductors);
+    booking.W_per_A = volts_V * (unknown ? 3 : most);
     return booking;
 }
 
@@ -222,7 +236,7 @@ static void fill_demand(const taper_session_table_t *table, uint8_t connector, u
     const taper_session_t *session = &table->session[connector];
     memset(demand, 0, sizeof *demand);
     if (taper_session_idle_reason(table, connector, now_ms) != TAPER_REASON_PLANNED) {
-        demand->booking = taper_session_booking(table, connector, now_ms,
+        demand->booking = taper_session_booking(table, connector, now_ms, config->phases,
                                                 config->phases); /* whatever its phases do by now */
         return;
     }
@@ -233,7 +247,7 @@ static void fill_demand(const taper_session_table_t *table, uint8_t connector, u
     demand->min_mA = min_current_mA(config, session);
     demand->conductors = phases_in_use(config, session);
     demand->W_per_A = volts(config, session, now_ms) * demand->conductors;
-    demand->booking = taper_session_booking(table, connector, now_ms, demand->conductors);
+    demand->booking = taper_session_booking(table, connector, now_ms, demand->conductors, demand->conductors);
     demand->departs_in_s = departs_in_s(table, session, now_ms);
     fill_battery(demand, session, now_ms);
 }

@@ -92,10 +92,11 @@ void taper_allocator_restore(taper_allocator_t *allocator, uint8_t connector, ui
 taper_waiting_t taper_allocator_waiting(const taper_allocator_t *allocator, uint8_t connector);
 
 /**
- * Lower currents until no group's imbalance is above its limit: of those on its strongest phase and not on its weakest one,
- * first who is on one phase, from the end of `rank` up, down to the minimum; only if that is not enough, to 0. Nothing is
- * raised. `rank` is [connectors]; whom it does not name is cut first. Cost: O(connectors + groups), and while a group tilts at most
- * (connectors + groups) x 2 times O(connectors x depth).
+ * Lower currents until no group's imbalance is above its limit, on whatever phases those are whose phases are unsure: of those
+ * that may be on its strongest phase and are not for sure on its weakest one, first who is unsure, then who is on one phase,
+ * from the end of `rank` up, down to the minimum; only if that is not enough, to 0. Nothing is raised. `rank` is [connectors];
+ * whom it does not name is cut first. Cost: O(connectors x depth) for every group that limits its imbalance, and while one
+ * tilts that again, at most (connectors + groups) x 2 times.
  */
 void taper_balance(const taper_station_config_t *config, const taper_snapshot_t *snapshot,
                    const taper_rows_t *rows, const uint8_t *rank, taper_setpoints_t *setpoints);

@@ -7,7 +7,8 @@
  * draws the fallback current of the setpoint that it accepted last, for as long as nobody reaches it. Without a vehicle
  * (pilot A, or so it says) its contactor is open and all of this is over at once; the next vehicle draws nothing before
  * its first setpoint. What one connector holds like this, no other is given: break before make (docs/protocol.md, the four
- * rules).
+ * rules). An echo proves nothing of a setpoint whose counter it named before that was sent: a frame whose counter was
+ * corrupted may have a good CRC (docs/protocol.md). The next setpoint is proven again.
  *
  * What a connector measures above all that, and above the tolerance of draw.h, counts as drawn for as long as it says so
  * (fault 41).
@@ -56,6 +57,8 @@ typedef struct {
     int32_t unknown_mA;   /**< what a controller before this one may have told it; 0: nothing any more */
     uint32_t unknown_until_ms; /**< end of that, with the vehicle's reaction */
     uint8_t first_echo;      /**< + 1; may still be of that time. 0: none heard; UINT8_MAX: echoes are ours */
+    uint8_t reported;        /**< + 1: the counter that it echoed last; 0: none, or it fell back since */
+    uint8_t unproven;        /**< + 1: the setpoint whose counter it echoed before that was sent; 0: none */
     bool accepts;            /**< it has accepted a setpoint of ours since its vehicle came */
     int32_t drawn_mA;        /**< measured above what it may; 0: not so */
     uint32_t drawn_until_ms; /**< for how long that holds without another report */
@@ -124,7 +127,8 @@ int32_t taper_ledger_unreached_mA(const taper_ledger_t *ledger, uint8_t connecto
 /**
  * Bound `target`, which holds every limit by itself, by what others may still draw: decreases go through, increases in the
  * order of `rank` as far as room is left in every row of `rows`, those of now. Below a row that is overdrawn (its limit fell,
- * or a vehicle over-draws) nobody is told more than last, so the excess ends when the slowest vehicle has followed.
+ * or a vehicle over-draws) nobody is told more than last, so the excess ends when the slowest vehicle has followed; and whose
+ * setpoints ran out nothing, since he may draw nothing by now.
  * `granted <= target` for every connector, and at least the minimum current or nothing. Where a group limits its imbalance,
  * that holds for what is granted too. Cost: O(connectors x depth of the tree), and that of taper_balance().
  */
@@ -136,7 +140,8 @@ void taper_ledger_grant(const taper_ledger_t *ledger, const taper_station_config
  * Choose the fallback current that goes with each setpoint: in the order of `rank` the configured one, never above what is
  * granted, at least the minimum current or nothing, in steps of TAPER_FALLBACK_STEP_mA. The sum of the power of all that connectors may
  * have been told stays within `failsafe_W`, however old. What was told last is kept where it can be, so a higher rank takes
- * from nobody. While the sum is above (the limit fell, or after a start) nobody is told more than last. Cost: O(connectors).
+ * from nobody. While the sum is above (the limit fell, or after a start) nobody is told any: who can be reached gives up for who
+ * cannot. Cost: O(connectors).
  */
 void taper_ledger_grant_fallback(const taper_ledger_t *ledger, const taper_station_config_t *config,
                                  const taper_snapshot_t *snapshot, const taper_rows_t *rows,
@@ -151,7 +156,7 @@ bool taper_guard_hand_over_passes(const taper_ledger_t *ledger, const taper_stat
                                   const taper_snapshot_t *snapshot, const taper_supply_t *supply,
                                   const taper_setpoints_t *granted);
 
-/** The same for fallback currents: none above its setpoint, and their sum within `failsafe_W`, or no more than before. */
+/** The same for fallback currents: none above its setpoint, and the sum of all that may have been told within `failsafe_W`, or none. */
 bool taper_guard_fallback_passes(const taper_ledger_t *ledger, const taper_station_config_t *config,
                                  const taper_snapshot_t *snapshot, int32_t failsafe_W,
                                  const taper_setpoints_t *granted, const taper_setpoints_t *fallback);

@@ -219,6 +219,7 @@ typedef struct {
     int32_t sent_mA[TAPER_MAX_CONNECTORS];          /**< what was last sent; negative: nothing that counts */
     int32_t sent_fallback_mA[TAPER_MAX_CONNECTORS];
     uint8_t sent_command[TAPER_MAX_CONNECTORS];
+    uint8_t sent_phases[TAPER_MAX_CONNECTORS];
     uint8_t sent_session[TAPER_MAX_CONNECTORS]; /**< and for whom */
     uint32_t sent_ms[TAPER_MAX_CONNECTORS];     /**< and when */
     bool status_due[TAPER_MAX_BUSES];           /**< the CTRL_STATUS of this tick is not out yet */

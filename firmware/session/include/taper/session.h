@@ -151,9 +151,12 @@ void taper_session_update(taper_session_table_t *table, uint32_t now_ms);
  */
 void taper_session_snapshot(const taper_session_table_t *table, uint32_t now_ms, taper_snapshot_t *snapshot);
 
-/** What 1 A of a connector counts with its first `conductors` (1..3) in use, whatever it says of these. Cost: constant. */
+/**
+ * What 1 A of a connector counts with up to its first `most` conductors (1..3) in use, whatever it says of these, where the
+ * setpoint is on its first `allowed` only. Cost: constant.
+ */
 taper_booking_t taper_session_booking(const taper_session_table_t *table, uint8_t connector, uint32_t now_ms,
-                                      uint8_t conductors);
+                                      uint8_t allowed, uint8_t most);
 
 /** Why a connector without an active demand has none: TAPER_REASON_PLANNED for one that has. Cost: constant. */
 taper_reason_t taper_session_idle_reason(const taper_session_table_t *table, uint8_t connector,

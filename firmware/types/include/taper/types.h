@@ -180,6 +180,8 @@ typedef struct {
     int32_t W_per_A;   /**< power of 1 A of setpoint, with the converter's losses; 0: by the description */
     int32_t permille;  /**< current on each of `phases` for 1 A of setpoint */
     uint8_t phases;    /**< of the supply: bit 0 L1 .. bit 2 L3; 0: by the description */
+    uint8_t idle;      /**< those of `phases` that the setpoint is not on, but older ones in force may be */
+    uint8_t unsure;    /**< those that balance nobody: idle, or else the wiring is not sure to lead there */
     bool line_to_line; /**< it flows between the two `phases` */
 } taper_booking_t;
 
