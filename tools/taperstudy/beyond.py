@@ -83,12 +83,14 @@ class LearningTopic(Topic):
 
     def outcome(self, results: Results) -> Outcome:
         told_right = [setting for setting in self.settings if "--taper-error" not in setting.options]
-        day = [setting for setting in told_right if setting.name.startswith("synthetic")]
-        week = [setting for setting in told_right if setting not in day]
+        days = [setting for setting in told_right if setting.name.startswith("synthetic")]
+        week = [setting for setting in told_right if setting not in days]
+        noisy = [setting for setting in days if NOISE[0] in setting.options]
+        exact = [setting for setting in days if setting not in noisy]
         headlines = {
             f"soc-mpc-learned, most lost against knowing the taper, {name} [%]": max(
                 _lost_percent(results, setting) for setting in settings)
-            for name, settings in (("real week", week), ("synthetic day", day))
+            for name, settings in (("real week", week), ("synthetic day", exact), ("the same with wrong meters", noisy))
         }
         return replace(super().outcome(results), headlines=headlines)
 
