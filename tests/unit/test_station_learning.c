@@ -217,6 +217,24 @@ static void test_the_planner_hears_of_a_line_that_moved_but_not_all_the_time(voi
     TEST_ASSERT_TRUE(told <= 10); /* once in two minutes; caps of draw.h count as well */
 }
 
+static void test_a_line_below_the_minimum_that_may_be_wrong_is_put_to_the_proof_before_others(void) {
+    start(true);
+    plug(8000, 2.0); /* its battery is a tenth of what it tells */
+    pass(30 * MINUTE, AMPLE_W);
+    TEST_ASSERT_TRUE(bench.station.learning[0].counted);
+    plug(9000, 0.0);
+    bench_send_vehicle(1, ++vehicle.session, 750); /* there the line of such a battery is at 0 */
+    pass(1, SCARCE_W);
+    TEST_ASSERT_EQUAL_INT32(0, taper_battery_limit_W(demand()));
+    int32_t most_W = 0;
+    for (unsigned k = 0; k < 3 * MINUTE; k++) {
+        pass(1, 1); /* others leave nothing */
+        most_W = taper_max_i32(most_W, bench.station.proposal.wish_W[0]);
+    }
+    TEST_ASSERT_TRUE(most_W >=
+                     (int32_t)(LEAST_A * W_PER_A)); /* with less it draws nothing, and shows nothing */
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_a_station_that_does_not_learn_keeps_what_is_told);
@@ -231,5 +249,6 @@ int main(void) {
     RUN_TEST(test_a_current_belongs_to_the_energy_at_which_it_began);
     RUN_TEST(test_where_all_is_wanted_a_line_that_is_known_is_seldom_exceeded);
     RUN_TEST(test_the_planner_hears_of_a_line_that_moved_but_not_all_the_time);
+    RUN_TEST(test_a_line_below_the_minimum_that_may_be_wrong_is_put_to_the_proof_before_others);
     return UNITY_END();
 }

@@ -177,6 +177,19 @@ static bool is_due(const taper_station_t *station, uint8_t i, taper_learning_t *
 }
 
 /**
+ * The least that it is offered above its line: the margin. Below its minimum it would draw nothing, and never show that the line
+ * is too low: it is offered that much if the line may be so wrong.
+ */
+static int32_t least_more_W(const taper_station_t *station, uint8_t i, int32_t limit_W) {
+    const taper_demand_t *demand = &station->snapshot.demand[i];
+    const int32_t clear_W = margin_W(&station->learning[i], demand, limit_W);
+    const int32_t minimum_W = part(demand->min_mA + TAPER_CURRENT_STEP_mA, demand->W_per_A) - limit_W;
+    const bool may_be = minimum_W <= doubt_W(station, i);
+    const int32_t wanted_W = may_be ? taper_max_i32(clear_W, minimum_W) : clear_W;
+    return taper_min_i32(wanted_W, taper_demand_allowed_W(demand) - limit_W);
+}
+
+/**
  * An offer that is just the line would never be refused, and so never show that the line is too low. So where the vehicle is
  * to get all that it takes, it is offered a margin more: now and then before others, and else of what is left if all have all
  * that is of use to them, then as much as the line may be too low. @return how much of that.
@@ -190,7 +203,7 @@ static int32_t probe(taper_station_t *station, uint8_t i, int32_t left_W) {
     if (limit_W >= allowed_W || proposal->ceiling_W[i] < limit_W) {
         return 0;
     }
-    const int32_t more_W = taper_min_i32(margin_W(learning, demand, limit_W), allowed_W - limit_W);
+    const int32_t more_W = least_more_W(station, i, limit_W);
     if (more_W <= left_W) {
         const int32_t most_W = taper_min_i32(taper_max_i32(more_W, doubt_W(station, i)), allowed_W - limit_W);
         const int32_t taken_W = taper_min_i32(most_W, left_W);
