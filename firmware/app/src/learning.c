@@ -176,12 +176,16 @@ static bool is_due(const taper_station_t *station, uint8_t i, taper_learning_t *
     return !learning->rests;
 }
 
-/** What it is offered above its line. Below its minimum it draws nothing and shows nothing: that much, if the line may be so wrong. */
-static int32_t more_W(const taper_station_t *station, uint8_t i, int32_t limit_W) {
+/**
+ * The least that it is offered above its line: the margin. Below its minimum it would draw nothing, and never show that the line
+ * is too low: it is offered that much if the line may be so wrong.
+ */
+static int32_t least_more_W(const taper_station_t *station, uint8_t i, int32_t limit_W) {
     const taper_demand_t *demand = &station->snapshot.demand[i];
-    const int32_t margin = margin_W(&station->learning[i], demand, limit_W);
-    const int32_t least_W = part(demand->min_mA + TAPER_CURRENT_STEP_mA, demand->W_per_A) - limit_W;
-    const int32_t wanted_W = least_W > margin && least_W <= doubt_W(station, i) ? least_W : margin;
+    const int32_t clear_W = margin_W(&station->learning[i], demand, limit_W);
+    const int32_t minimum_W = part(demand->min_mA + TAPER_CURRENT_STEP_mA, demand->W_per_A) - limit_W;
+    const bool may_be = minimum_W <= doubt_W(station, i);
+    const int32_t wanted_W = may_be ? taper_max_i32(clear_W, minimum_W) : clear_W;
     return taper_min_i32(wanted_W, taper_demand_allowed_W(demand) - limit_W);
 }
 
@@ -199,16 +203,15 @@ static int32_t probe(taper_station_t *station, uint8_t i, int32_t left_W) {
     if (limit_W >= allowed_W || proposal->ceiling_W[i] < limit_W) {
         return 0;
     }
-    const int32_t least_W = more_W(station, i, limit_W);
-    if (least_W <= left_W) {
-        const int32_t most_W =
-            taper_min_i32(taper_max_i32(least_W, doubt_W(station, i)), allowed_W - limit_W);
+    const int32_t more_W = least_more_W(station, i, limit_W);
+    if (more_W <= left_W) {
+        const int32_t most_W = taper_min_i32(taper_max_i32(more_W, doubt_W(station, i)), allowed_W - limit_W);
         const int32_t taken_W = taper_min_i32(most_W, left_W);
         proposal->ceiling_W[i] = limit_W + taken_W;
         return taken_W;
     }
     if (proposal->wish_W[i] >= part(limit_W, ALL_permille) && is_due(station, i, learning, limit_W)) {
-        proposal->wish_W[i] = proposal->ceiling_W[i] = limit_W + least_W;
+        proposal->wish_W[i] = proposal->ceiling_W[i] = limit_W + more_W;
     }
     return 0;
 }

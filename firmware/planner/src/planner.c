@@ -23,9 +23,8 @@ _Static_assert(sizeof(OSQPFloat) == sizeof(taper_real_t),
 #define RELATIVE_TOLERANCE ((OSQPFloat)(TAPER_REAL_IS_DOUBLE ? 3e-4 : 1e-3))
 /**
  * The same of the log utility: the primal one as a share of the vehicles' mean power, which may be a small part of the
- * strongest connector's. Where the need of many cannot be met, lambda makes multipliers
- * that are thousands of times the gradients of the logarithm, which decide about the powers: the dual residual may be a share
- * of them besides.
+ * strongest connector's. Where the need of many cannot be met, lambda makes multipliers that are thousands of times the
+ * gradients of the logarithm, which decide about the powers: the dual residual may be a share of them besides.
  */
 #define LOG_PRIMAL_TOLERANCE ((OSQPFloat)(TAPER_REAL_IS_DOUBLE ? 4e-4 : 2e-3))
 #define LOG_DUAL_TOLERANCE   ((OSQPFloat)(TAPER_REAL_IS_DOUBLE ? 2e-4 : 2e-3))
