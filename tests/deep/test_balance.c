@@ -285,12 +285,17 @@ static void test_a_rank_that_names_nobody_or_one_twice_still_cuts(void) {
     assert_currents(6000, 8000, 6000);
 }
 
+/** Connector `i` is on these lines by older setpoints alone. */
+static void only_older_setpoints_are_on(uint8_t i, uint8_t lines) {
+    tree.snapshot.demand[i].booking.idle = lines;
+    tree.snapshot.demand[i].booking.unsure = lines;
+}
+
 static void test_a_setpoint_does_not_balance_phases_that_only_older_ones_are_on(void) {
     add(0, L1, 15000);
     add(0, L2, 16000);
     add(0, L1 | L2 | L3, 18000); /* on L2 by now: 15, 34, 0 */
-    tree.snapshot.demand[2].booking.idle = L1 | L3;
-    tree.snapshot.demand[2].booking.unsure = L1 | L3;
+    only_older_setpoints_are_on(2, L1 | L3);
     tree.group[0].imbalance_mA = 20000;
     TEST_ASSERT_FALSE(tree_guard(&tree));
     balance();
@@ -301,8 +306,7 @@ static void test_phases_that_only_older_setpoints_are_on_are_not_the_strong_ones
     add(0, L1, 15000);
     add(0, L2, 2000);
     add(0, L1 | L2 | L3, 18000); /* on L2 by now: 15, 20, 0 */
-    tree.snapshot.demand[2].booking.idle = L1 | L3;
-    tree.snapshot.demand[2].booking.unsure = L1 | L3;
+    only_older_setpoints_are_on(2, L1 | L3);
     tree.snapshot.demand[1].min_mA = 0;
     tree_assert_just_enough(&tree, &tree.group[0].imbalance_mA, 20000);
     balance();
